@@ -108,7 +108,8 @@ def split(mesh: Mesh, label: Ints | None = None) -> list[Component]:
     for ids, which in zip(vertices, faces, strict=True):
         local[ids] = np.arange(len(ids))
         table = mesh.faces[which]
-        own = Mesh(mesh.vertices[ids], np.where(table < 0, -1, local[table]))
+        said = None if mesh.attributes is None else mesh.attributes.taken(which)
+        own = Mesh(mesh.vertices[ids], np.where(table < 0, -1, local[table]), attributes=said)
         out.append(Component(own, ids, which))
     return out
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.errors import MeshError
-from gso.mesh import Mesh
+from gso.mesh import GivenSurfaces, Mesh
 from gso.mesh.topology import edge_keys, label_components
 from gso.recognition import Recognised, recognise
 from gso.typing import Array, Flags, Ints
@@ -77,9 +77,11 @@ def sheet_solid(mesh: Mesh) -> SheetSolid | None:
     shape = recognise(mesh)
     points, triangles = shape.vertices, shape.triangles
     a, b, c = (points - points.mean(axis=0))[triangles].transpose(1, 0, 2)
+    turns = np.arange(3)
     if np.einsum("td,td->", a, np.cross(b, c)) < 0:
         # Faces are seen from inside.
-        triangles = triangles[:, ::-1]
+        turns = turns[::-1]
+    triangles = triangles[:, turns]
     areas, normals = _areas(points, triangles)
     found = _opposite(shape, triangles, areas, normals)
     if not len(found.face):
@@ -97,10 +99,13 @@ def sheet_solid(mesh: Mesh) -> SheetSolid | None:
     if exact.any():
         thickness = float(np.median(found.distance[exact]))
     sides = _two_sides(points, triangles, own, areas, normals)
-    _check_faces(shape, triangles, sides, thickness)
-    chosen = triangles[sides == 0]
-    used, compact = np.unique(chosen, return_inverse=True)
-    return SheetSolid(Mesh(points[used], compact.reshape(-1, 3)), thickness)
+    said = None if mesh.attributes is None or not mesh.is_triangles else mesh.attributes
+    _check_faces(shape, triangles, sides, thickness, None if said is None else said.surfaces)
+    chosen = np.flatnonzero(sides == 0)
+    used, compact = np.unique(triangles[chosen], return_inverse=True)
+    if said is not None:
+        said = said.taken(shape.source[chosen], np.broadcast_to(turns, (len(chosen), 3)))
+    return SheetSolid(Mesh(points[used], compact.reshape(-1, 3), attributes=said), thickness)
 
 
 def _areas(points: Array, triangles: Ints) -> tuple[Array, Array]:
@@ -222,7 +227,13 @@ def _two_sides(points: Array, triangles: Ints, own: Flags, areas: Array, normals
     )
 
 
-def _check_faces(shape: Recognised, triangles: Ints, sides: Ints, thickness: float) -> None:
+def _check_faces(
+    shape: Recognised,
+    triangles: Ints,
+    sides: Ints,
+    thickness: float,
+    given: GivenSurfaces | None,
+) -> None:
     """Raise an error if a face is neither on a side nor reaches from one to the other.
 
     Or if it is curved in two directions.
@@ -236,20 +247,30 @@ def _check_faces(shape: Recognised, triangles: Ints, sides: Ints, thickness: flo
         if len(odd) or not all(some[corners].any() for some in on):
             place = shape.vertices[odd if len(odd) else corners]
             if shape.faces[number].kind == "free":
-                raise MeshError(_curved(place, thickness))
+                names = _names(shape, shape.faces[number].triangles, given)
+                raise MeshError(_curved(place, thickness, names))
             raise MeshError(
                 f"{_place(place)}: the sheet is not {thickness:.6g} thick there, as it is "
                 "elsewhere; leave out ribs, pockets, chamfers and countersinks"
             )
     free = np.flatnonzero(~shape.developable & (sides >= 0))
     if len(free):
-        raise MeshError(_curved(shape.vertices[triangles[free]], thickness))
+        names = _names(shape, free, given)
+        raise MeshError(_curved(shape.vertices[triangles[free]], thickness, names))
 
 
-def _curved(points: Array, thickness: float) -> str:
+def _names(shape: Recognised, triangles: Ints, given: GivenSurfaces | None) -> str:
+    """Name the faces of a CAD file that triangles are on, in brackets; "" for a mesh."""
+    if given is None:
+        return ""
+    numbers = np.unique(given.of_face[shape.source[triangles]])
+    return f" ({', '.join(given.surfaces[k].name for k in numbers.tolist())})"
+
+
+def _curved(points: Array, thickness: float, names: str) -> str:
     return (
-        f"{_place(points)}: the sheet of {thickness:.6g} is curved in two directions there, like "
-        "a sphere; it cannot be unfolded, only pressed"
+        f"{_place(points)}{names}: the sheet of {thickness:.6g} is curved in two directions "
+        "there, like a sphere; it cannot be unfolded, only pressed"
     )
 
 

@@ -44,18 +44,21 @@ class Polyhedron(Protocol):
 
 @dataclass(frozen=True)
 class Unwelded:
-    """Input of :func:`gso.as_mesh` together with the distance within which to merge its vertices.
+    """Input of :func:`gso.as_mesh` together with how it is read.
 
     Attributes
     ----------
     surface : MeshLike
         Anything that it takes.
-    weld : float
+    weld : float or None
         Vertices within this distance of each other are merged.
+    chord : float or None
+        Chord tolerance of a CAD file, in millimetres.
     """
 
     surface: MeshLike
-    weld: float
+    weld: float | None = None
+    chord: float | None = None
 
 
 #: What :func:`gso.as_mesh` takes: a mesh, a grid of points, vertices and faces, or a file.

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.special import ellipe
 
 import gso
 from gso import io, recognition
@@ -18,6 +19,7 @@ from OCP.BRepBuilderAPI import (
     BRepBuilderAPI_MakeEdge,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakeWire,
+    BRepBuilderAPI_Transform,
 )
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
@@ -25,11 +27,12 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeBox,
     BRepPrimAPI_MakeCone,
     BRepPrimAPI_MakeCylinder,
+    BRepPrimAPI_MakeHalfSpace,
     BRepPrimAPI_MakePrism,
     BRepPrimAPI_MakeSphere,
 )
 from OCP.GC import GC_MakeArcOfCircle
-from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Vec
+from OCP.gp import gp_Ax2, gp_Circ, gp_Dir, gp_Elips, gp_Pln, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.IGESControl import IGESControl_Writer
 from OCP.Interface import Interface_Static
@@ -127,6 +130,15 @@ def made(path, *, step=False, **finish):
     )
 
 
+def mass(path):
+    """Return the volume of the solids in a STEP file, by OpenCASCADE."""
+    reader, found = STEPControl_Reader(), GProp_GProps()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    BRepGProp.VolumeProperties_s(reader.OneShape(), found)
+    return found.Mass()
+
+
 def volume(mesh):
     a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
     return np.einsum("td,td->", a, np.cross(b, c)) / 6
@@ -192,6 +204,93 @@ class TestReading:
             gso.load(tmp_path / "a.obj", chord=0.1)
 
 
+def half_ellipse(height, *ends):
+    """An extrusion of half an ellipse with the axes 50 and 20, between plates that touch it."""
+    wire = BRepBuilderAPI_MakeWire()
+    axes = gp_Elips(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 50.0, 20.0)
+    wire.Add(BRepBuilderAPI_MakeEdge(axes, 0.0, np.pi).Edge())
+    for x in ends:
+        wire.Add(BRepBuilderAPI_MakeEdge(gp_Pnt(x, 0, 0), gp_Pnt(x, -40, 0)).Edge())
+    return BRepPrimAPI_MakePrism(wire.Wire(), gp_Vec(0, 0, height)).Shape()
+
+
+def elliptic_cone(base, top, height):
+    """A loft between ellipses of 50 x 20, at two scales: its apex is on the axis."""
+    loft = BRepOffsetAPI_ThruSections(False, True)
+    for z, scale in ((0.0, base), (height, top)):
+        place = gp_Ax2(gp_Pnt(0, 0, z), gp_Dir(0, 0, 1))
+        edge = BRepBuilderAPI_MakeEdge(gp_Elips(place, 50.0 * scale, 20.0 * scale)).Edge()
+        loft.AddWire(BRepBuilderAPI_MakeWire(edge).Wire())
+    return loft.Shape()
+
+
+class TestEquations:
+    """Faces are unrolled from the surfaces of the file, not from triangles."""
+
+    @pytest.mark.parametrize("chord", [2.0, 0.01])
+    def test_an_extrusion_is_as_long_as_its_section(self, tmp_path, chord):
+        path = saved(half_ellipse(30.0), tmp_path / "a.step")
+        (face,) = recognition.recognise(gso.load(path, chord=chord)).faces
+        section = 100.0 * ellipe(1 - 0.16)
+        size = np.sort(np.ptp(face.flat.reshape(-1, 2), axis=0))
+        np.testing.assert_allclose(size, [30.0, section], rtol=1e-9)
+        assert face.kind == "torsal" and face.bend_angle == pytest.approx(np.pi, abs=1e-9)
+        # b^2 / a and a^2 / b at the vertices of the ellipse.
+        radii = [line.radius_start for line in face.bend_lines]
+        assert radii[0] == pytest.approx(8.0) and max(radii) == pytest.approx(125.0, rel=0.01)
+
+    def test_tangent_neighbours_are_one_part_without_a_fold(self, tmp_path):
+        (part,) = made(saved(half_ellipse(30.0, -50.0, 50.0), tmp_path / "a.step")).parts
+        np.testing.assert_allclose(part.size, [80 + 100.0 * ellipe(1 - 0.16), 30.0], rtol=1e-9)
+        assert sum(abs(bend.angle) for bend in part.bends) == pytest.approx(np.pi, abs=1e-9)
+
+    def test_a_loft_has_the_area_of_its_cone(self, tmp_path):
+        path = saved(elliptic_cone(1.0, 0.5, 40.0), tmp_path / "a.step")
+        (face,) = recognition.recognise(gso.load(path, chord=0.02)).faces
+        flat = face.flat - face.flat[:, :1]
+        area = 0.5 * np.abs(np.linalg.det(flat[:, 1:])).sum()
+        t = 2 * np.pi * (np.arange(4000) + 0.5) / 4000
+        p = np.stack([50 * np.cos(t), 20 * np.sin(t), np.full_like(t, -80.0)], axis=1)
+        d = np.stack([-50 * np.sin(t), 20 * np.cos(t), np.zeros_like(t)], axis=1)
+        whole = 0.75 * np.linalg.norm(np.cross(p, d), axis=1).mean() * np.pi
+        # The outlines are within the chord tolerance.
+        assert whole * (1 - 5e-4) < area < whole
+        assert len(face.seam) == 1
+
+    def test_an_elbow_of_cylinders_is_cut_at_its_mitre(self, tmp_path):
+        radius, reach = 20.0, 60.0
+        rod = BRepPrimAPI_MakeCylinder(radius, reach + 2 * radius).Shape()
+        mitre = gp_Ax2(gp_Pnt(0, 0, reach), gp_Dir(1, 0, 1))
+        plane = BRepBuilderAPI_MakeFace(gp_Pln(mitre.Location(), mitre.Direction())).Face()
+        half = cut(rod, BRepPrimAPI_MakeHalfSpace(plane, gp_Pnt(100, 0, 160)).Solid())
+        mirror = gp_Trsf()
+        mirror.SetMirror(mitre)
+        elbow = fused(half, BRepBuilderAPI_Transform(half, mirror, True).Shape())
+        done = made(saved(elbow, tmp_path / "a.step"))
+        pipes = [part for part in done.parts if part.bends]
+        assert sum(part.count for part in done.parts) == 4 and sum(p.count for p in pipes) == 2
+        for part in pipes:
+            np.testing.assert_allclose(part.size, [2 * np.pi * radius, reach + radius], rtol=1e-5)
+            assert part.area == pytest.approx(2 * np.pi * radius * reach, rel=1e-6)
+            turned = sum(abs(bend.angle) for bend in part.bends)
+            assert turned == pytest.approx(2 * np.pi, rel=1e-9)
+
+    def test_a_sphere_on_a_solid_is_named_and_meshed(self, tmp_path):
+        ball = BRepPrimAPI_MakeSphere(gp_Pnt(50, 30, 40), 15.0).Shape()
+        shape = fused(box((0, 0, 0), (100, 60, 40)), ball)
+        mesh = gso.load(saved(shape, tmp_path / "a.step"), chord=0.5)
+        (note,) = mesh.notes
+        assert "within 0.5 mm" in note and re.search(r"not developable: face \d \(sphere\)", note)
+        kinds = [face.kind for face in recognition.recognise(mesh).faces]
+        assert sorted(kinds) == ["free", *["plane"] * 6]
+
+    def test_moved_vertices_are_fitted_again(self, tmp_path):
+        mesh = gso.load(saved(BRepPrimAPI_MakeCylinder(20.0, 60.0).Shape(), tmp_path / "a.step"))
+        found = recognition.recognise(mesh.replaced(2.0 * mesh.vertices))
+        (face,) = (face for face in found.faces if face.kind == "cylinder")
+        assert face.radius == pytest.approx(40.0, rel=1e-6)
+
+
 class TestSheetMetal:
     @pytest.mark.parametrize("k", [0.33, 0.44, 0.5])
     @pytest.mark.parametrize("angle", [np.pi / 6, np.pi / 2])
@@ -247,7 +346,7 @@ class TestSheetMetal:
         ball = BRepPrimAPI_MakeSphere(gp_Pnt(60, 40, -10), 25.0).Shape()
         inner = BRepPrimAPI_MakeSphere(gp_Pnt(60, 40, -10), 22.0).Shape()
         shape = cut(fused(sheet, ball), inner, box((-50, -50, -60), (200, 200, 0)))
-        with pytest.raises(gso.MeshError, match=r"near \(60.*curved in two directions"):
+        with pytest.raises(gso.MeshError, match=r"near \(60.*\(sphere\).*curved in two directions"):
             made(saved(shape, tmp_path / "a.step"))
 
     def test_another_thickness_or_unit_is_refused(self, tmp_path):
@@ -312,8 +411,14 @@ class TestFoldedSolids:
         again = gso.load(done.folder / "folded.step")
         assert again.attributes.labels["o"].names == ("part",) and not again.boundary_loops
         section = THICK * sum(FLANGES) + np.pi / 4 * ((INNER + THICK) ** 2 - INNER**2)
-        # Facets are inside of the outer circle: by 1 - sin(a)/a for facets of 7.5 degrees.
+        # Triangles of the round faces are inside of the outer circle.
         assert volume(again) == pytest.approx(WIDTH * section, rel=1e-3)
+        assert mass(done.folder / "folded.step") == pytest.approx(WIDTH * section, rel=1e-9)
+        kinds = [face.kind for face in again.attributes.surfaces.surfaces]
+        assert sorted(kinds) == ["cylinder"] * 2 + ["plane"] * 8
+        # A later run without it leaves none.
+        assert "folded.step" not in made(tmp_path / "part.step", k_factor=0.4).files
+        assert not (done.folder / "folded.step").exists()
         np.testing.assert_allclose(
             np.ptp(again.vertices, axis=0),
             [FLANGES[0] + INNER + THICK, WIDTH, FLANGES[1] + INNER + THICK],
@@ -325,19 +430,35 @@ class TestFoldedSolids:
 
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")
         done = made(path, step=True, thickness=Thickness(1.0, face="inside"))
-        reader = STEPControl_Reader()
-        reader.ReadFile(str(done.folder / "folded.step"))
-        reader.TransferRoots()
-        found = GProp_GProps()
-        BRepGProp.VolumeProperties_s(reader.OneShape(), found)
+        found = mass(done.folder / "folded.step")
         # Walls outside of the box, mitres of 1 x 1 along the five folds, and something of them
         # along the seams, whose ends are mitred.
         walls = 2 * (100 * 60 + 100 * 40 + 60 * 40)
         folds, edges = 2 * 100 + 2 * 60 + 40, 4 * (100 + 60 + 40)
-        assert walls + folds < found.Mass() < walls + edges
+        assert walls + folds < found < walls + edges
         # Walls that meet at seams touch each other: they stay apart when the file is read.
         again = gso.load(done.folder / "folded.step")
-        assert volume(again) == pytest.approx(found.Mass(), rel=1e-9)
+        assert volume(again) == pytest.approx(found, rel=1e-9)
+
+    @pytest.mark.parametrize("slope", [0.0, 0.3])
+    def test_tubes_and_cones_are_round(self, tmp_path, slope):
+        from gso.workshop import Thickness
+
+        t, z = np.meshgrid(np.linspace(0, 2 * np.pi, 37), [0.0, 30.0, 60.0])
+        r = 20 + slope * z
+        grid = np.stack([r * np.cos(t), r * np.sin(t), z], axis=-1)
+        done = gso.fabricate(
+            grid,
+            tmp_path / "out",
+            finish=Finish(**BARE, thickness=Thickness(2.0)),
+            workers=0,
+            formats=("svg",),
+            step=True,
+        )
+        # By Pappus: a strip of 2 on both sides of the ruling, whose middle is at its mean radius.
+        side = 60.0 * np.hypot(1.0, slope)
+        volume = 2 * np.pi * (20 + 30 * slope) * 2.0 * side
+        assert mass(done.folder / "folded.step") == pytest.approx(volume, rel=1e-9)
 
     def test_a_design_without_thickness_is_refused(self, tmp_path):
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")

@@ -142,6 +142,7 @@ if TYPE_CHECKING:
 @shared.workers
 @shared.scheduler
 @file_options.weld
+@file_options.chord
 @shared.quiet
 def fabricate(
     inputs: tuple[str, ...],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gso.cli.shared_options import MM
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -32,6 +33,23 @@ weld = click.option(
     "vertices of their own. 0 merges equal ones.",
 )
 
+
+def _remembered(ctx: click.Context, option: click.Parameter, value: float | None) -> None:
+    ctx.meta[_CHORD] = value
+
+
+_CHORD = "gso.chord"
+#: ``--chord MM``; :func:`load` and :func:`source` take it from the command's context.
+chord = click.option(
+    "--chord",
+    metavar="MM",
+    type=MM,
+    callback=_remembered,
+    expose_value=False,
+    help="Largest distance of curved edges and faces of a CAD file from their chords; 1e-4 of the "
+    "size by default. Planes, cylinders, cones and other torsal faces are unrolled exactly.",
+)
+
 #: ``--force``
 force = click.option("--force", is_flag=True, help="Let an output replace an input.")
 
@@ -40,14 +58,20 @@ def load(file: str, weld: float | None = None) -> Mesh:
     """Read a mesh from a file, and merge vertices if `weld` is given."""
     from gso import io
 
-    return io.load(file, weld=weld)
+    return io.load(file, weld=weld, chord=_chord())
 
 
 def source(file: str, weld: float | None) -> str | Unwelded:
     """Return a file as input of :func:`gso.as_mesh`, for a worker process to read."""
     from gso.io import Unwelded
 
-    return file if weld is None else Unwelded(file, weld)
+    chord = _chord()
+    return file if weld is None and chord is None else Unwelded(file, weld, chord)
+
+
+def _chord() -> float | None:
+    context = click.get_current_context(silent=True)
+    return None if context is None else context.meta.get(_CHORD)
 
 
 def here(file: str, weld: float | None) -> Mesh | str | Unwelded:

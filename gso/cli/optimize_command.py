@@ -67,6 +67,7 @@ from gso.errors import OptionError
 @shared.table
 @shared.unit
 @file_options.weld
+@file_options.chord
 @file_options.force
 @shared.quiet
 def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:

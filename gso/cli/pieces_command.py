@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 @shared.unit
 @shared.workers
 @file_options.weld
+@file_options.chord
 @file_options.force
 @shared.quiet
 def pieces(

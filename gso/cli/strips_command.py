@@ -65,6 +65,7 @@ class _StripsJob(Job):
 @shared.table
 @shared.unit
 @file_options.weld
+@file_options.chord
 @file_options.force
 @shared.quiet
 def strips(

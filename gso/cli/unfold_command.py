@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 @shared.height
 @shared.up
 @file_options.weld
+@file_options.chord
 @file_options.force
 @shared.quiet
 def unfold(
@@ -77,6 +78,7 @@ def unfold(
     """
     import numpy as np
 
+    from gso.mesh import Mesh
     from gso.seams import Labels
     from gso.unfolding import unfold as make
     from gso.workshop import Finish, writers
@@ -88,8 +90,8 @@ def unfold(
     file_options.spare([name], [out], force)
     finish = Finish(notches=None, tabs=tabs, numbers=numbers)
     edges = np.array(cut, np.int64).reshape(-1, 2)
-    mesh = file_options.load(name, weld) if keep_groups or weld is not None else name
-    if keep_groups and not isinstance(mesh, str):
+    mesh = file_options.load(name, weld) if keep_groups else file_options.source(name, weld)
+    if isinstance(mesh, Mesh):
         edges = np.concatenate([edges, Labels("g").edges(mesh)])
     factor = file_options.scale_of([mesh], scale, height, up, unit)
 

@@ -23,6 +23,8 @@ from gso.unfolding.folding import misfit
 
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7
+#: Angle between normals at both ends of an edge, in radians, up to which it is along a ruling.
+_TURNED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,7 @@ def folded_pattern(
         shape.triangles,
         shape.face,
         flat,
-        cut=np.concatenate([np.reshape(cut, (-1, 2)).astype(int), _unequal(shape, flat)]),
+        cut=np.concatenate([np.reshape(cut, (-1, 2)).astype(int), _apart(shape, flat)]),
         keep=keep,
         sheet=sheet,
     )
@@ -171,12 +173,30 @@ def folded_pattern(
     )
 
 
-def _unequal(shape: Recognised, flat: Array) -> Ints:
-    """Find edges that are not equally long in the flat images of both sides: they must be cut."""
+def _apart(shape: Recognised, flat: Array) -> Ints:
+    """Find edges that must be cut.
+
+    Those that are not equally long in the flat images of both sides, and those between two faces
+    that cross the rulings of one: a sheet cannot be folded there.
+    """
     edges = dual_edges(shape.triangles, shape.vertices)
     corners = flat.reshape(-1, 2)
     one, other = (
         np.linalg.norm(corners[ends[:, 0]] - corners[ends[:, 1]], axis=1)
         for ends in edges.corners()
     )
-    return np.asarray(edges.ends[np.abs(one - other) > _SAME * shape_size(shape)])
+    apart = np.abs(one - other) > _SAME * shape_size(shape)
+    sides = shape.face[edges.triangles]
+    for number, face in enumerate(shape.faces):
+        border = (sides == number).any(axis=1) & (sides[:, 0] != sides[:, 1])
+        ends = edges.ends[border]
+        a, b = shape.vertices[ends].transpose(1, 0, 2)
+        if face.surface is not None:
+            # Not at the ends, of which one may be an apex.
+            n, m = (face.surface.normals(a + share * (b - a)) for share in (0.25, 0.75))
+        elif face.normals is not None:
+            n, m = face.normals_at(ends).transpose(1, 0, 2)
+        else:
+            continue
+        apart[border] |= np.linalg.norm(n - m, axis=1) > _TURNED
+    return np.asarray(edges.ends[apart])

@@ -26,7 +26,7 @@ def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
     ends, pair = edges.ends[border], edges.triangles[border]
     middle = sliced.points[sliced.vertex[ends]].mean(axis=1)
     (first, round_one), (second, round_two) = (
-        _normals(sliced, shape, pair[:, side], middle) for side in (0, 1)
+        _normals(sliced, shape, pair[:, side], sliced.vertex[ends], middle) for side in (0, 1)
     )
     way = sliced.points[sliced.vertex[ends[:, 1]]] - sliced.points[sliced.vertex[ends[:, 0]]]
     angle = fold_angles(first, second, way)
@@ -36,17 +36,26 @@ def fold_edges(sliced: SlicedPattern, shape: Recognised) -> Folded:
 
 
 def _normals(
-    sliced: SlicedPattern, shape: Recognised, triangles: Ints, points: Array
+    sliced: SlicedPattern, shape: Recognised, triangles: Ints, ends: Ints, points: Array
 ) -> tuple[Array, Flags]:
-    """Return normals of triangles, of their round surface at a point where they have one."""
+    """Return normals of triangles at edges, those of their surface where its equation is known.
+
+    Edges have the vertices `ends` (k, 2) and the middles `points`.
+    """
     normal = unit(area_vectors(sliced.points, sliced.vertex[sliced.faces[triangles]]))
     number, is_round = sliced.label[triangles], np.zeros(len(triangles), bool)
     for k in np.unique(number).tolist():
-        surface = shape.faces[k].surface
-        if surface is not None:
-            which = number == k
-            exact = surface.normals(points[which])
-            side = np.sign(np.einsum("kd,kd->k", exact, normal[which]))
-            normal[which] = side[:, None] * exact
-            is_round |= which
+        face, which = shape.faces[k], np.flatnonzero(number == k)
+        if face.surface is not None:
+            exact = face.surface.normals(points[which])
+        elif face.normals is not None:
+            first, second = face.normals_at(ends[which]).transpose(1, 0, 2)
+            exact = np.where(np.isnan(first), second, first)
+            known = ~np.isnan(exact[:, 0])
+            which, exact = which[known], exact[known]
+        else:
+            continue
+        side = np.sign(np.einsum("kd,kd->k", exact, normal[which]))
+        normal[which] = side[:, None] * exact
+        is_round[which] = True
     return normal, is_round

@@ -22,6 +22,8 @@ from gso.io import arrays, glb, obj, off, ply, stl
 from gso.io.atomic import check_writable, replacing, suffix_of
 from gso.io.cad import (
     SPLINE_SUFFIXES,
+    Solid,
+    Turned,
     check_package,
     check_spline,
     read_faces,
@@ -42,7 +44,9 @@ from gso.typing import AnyPath, MeshLike, Unwelded
 __all__ = [
     "SPLINE_SUFFIXES",
     "SUFFIXES",
+    "Solid",
     "Surface",
+    "Turned",
     "Unwelded",
     "add_format",
     "as_mesh",

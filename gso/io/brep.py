@@ -28,8 +28,10 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gso.errors import MeshError
+from gso.io.brep_surfaces import surface_of
 from gso.io.opencascade import quiet, settings
 from gso.io.raw_surface import Surface
+from gso.mesh import GivenSurface, GivenSurfaces
 from gso.mesh.attributes import Attributes, Labels
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
@@ -42,6 +44,8 @@ _CHORD, _ANGLE = 1e-4, np.radians(7.5)
 _SAME, _SEWN = 1e-8, 1e-5
 #: Number of triangles from which on files are refused.
 _MOST = 5_000_000
+#: Number of faces that a note names.
+_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -124,11 +128,20 @@ def _surface(document: TDocStd_Document, chord: float | None) -> Surface:
     triangles: list[Ints] = []
     names: list[list[str]] = [[], [], []]
     notes: list[str] = []
+    surfaces: list[GivenSurface] = []
+    owners: list[Ints] = []
+    images: list[Array] = []
     count = 0
+    finest, coarsest = np.inf, 0.0
     for body in bodies:
-        mesh = _meshed(body.shape, chord)
+        allowed = _CHORD * _size(body.shape) if chord is None else chord
+        mesh = _meshed(body.shape, allowed, len(surfaces))
         if mesh is None:
             continue
+        finest, coarsest = min(finest, allowed), max(coarsest, allowed)
+        owners.append(mesh.face + len(surfaces))
+        surfaces += mesh.surfaces
+        images.append(mesh.image)
         points.append(mesh.points)
         triangles.append(mesh.triangles + count)
         count += len(mesh.points)
@@ -153,8 +166,24 @@ def _surface(document: TDocStd_Document, chord: float | None) -> Surface:
         for kind, row in zip(("o", "g", "usemtl"), names, strict=True)
         if (found := _labels(row)) is not None
     }
-    attributes = Attributes(labels=labels) if labels else None
+    image = np.concatenate(images)
+    given = GivenSurfaces(tuple(surfaces), np.concatenate(owners), image[..., :2], image[..., 2:])
+    notes.insert(0, _accuracy(finest, coarsest, given))
+    attributes = Attributes(labels=labels, surfaces=given)
     return Surface(np.concatenate(points), np.concatenate(triangles), tuple(notes), attributes)
+
+
+def _accuracy(finest: float, coarsest: float, given: GivenSurfaces) -> str:
+    """Say what is exact and what is within the chord tolerance."""
+    chord = " to ".join(f"{x:.3g}" for x in dict.fromkeys((finest, coarsest)))
+    free = [
+        x.name for x, good in zip(given.surfaces, given.is_developable, strict=True) if not good
+    ]
+    said = f"curved edges and faces are within {chord} mm of their chords"
+    if not free:
+        return said
+    more = f" and {len(free) - _NAMED} more" if len(free) > _NAMED else ""
+    return f"{said}; not developable: {', '.join(free[:_NAMED])}{more}"
 
 
 def _leaves(label: TDF_Label, place: TopLoc_Location, name: str) -> Iterator[_Body]:
@@ -211,22 +240,30 @@ def _size(shape: TopoDS_Shape) -> float:
 
 @dataclass(frozen=True)
 class _Meshed:
-    """Triangles of a body, the face of each, and how many faces are missing."""
+    """Triangles of a body, the face of each, how many faces are missing, and the surfaces.
+
+    `image` has the corners of unrolled triangles in the plane, and normals; (t, 3, 5).
+    """
 
     points: Array
     triangles: Ints
     face: Ints
     faces: list[TopoDS_Shape]
     missing: int
+    surfaces: list[GivenSurface]
+    image: Array
 
 
-def _meshed(shape: TopoDS_Shape, chord: float | None) -> _Meshed | None:
+def _meshed(shape: TopoDS_Shape, chord: float, first: int) -> _Meshed | None:
+    """Divide the faces of a body, which are numbered from `first` on, into triangles."""
     size = _size(shape)
-    BRepMesh_IncrementalMesh(shape, _CHORD * size if chord is None else chord, False, _ANGLE)
+    BRepMesh_IncrementalMesh(shape, chord, False, _ANGLE)
     faces = list(_inside(shape, TopAbs_ShapeEnum.TopAbs_FACE))
     points: list[Array] = []
     triangles: list[Ints] = []
     owner: list[Ints] = []
+    surfaces: list[GivenSurface] = []
+    images: list[Array] = []
     count = missing = 0
     starts = np.full(len(faces), -1)
     for number, face in enumerate(faces):
@@ -234,7 +271,12 @@ def _meshed(shape: TopoDS_Shape, chord: float | None) -> _Meshed | None:
         net = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
         if net is None or not net.NbTriangles():
             missing += 1
+            surfaces.append(GivenSurface(f"face {first + number}", "surface"))
             continue
+        inner = [net.UVNode(k).Coord() for k in range(1, net.NbNodes() + 1)]
+        surface, image = surface_of(face, first + number, np.array(inner))
+        surfaces.append(surface)
+        images.append(np.full((len(inner), 5), np.nan) if image is None else image)
         move = place.Transformation()
         nodes = [net.Node(k).Transformed(move) for k in range(1, net.NbNodes() + 1)]
         rows = [net.Triangle(k).Get() for k in range(1, net.NbTriangles() + 1)]
@@ -252,8 +294,10 @@ def _meshed(shape: TopoDS_Shape, chord: float | None) -> _Meshed | None:
     target = _joined(every, faces, starts, _SAME * size)
     done = collapse(corner, target)
     used, compact = np.unique(done.faces, return_inverse=True)
-    face_of = np.concatenate(owner)[done.kept]
-    return _Meshed(every[used], compact.reshape(-1, 3), face_of, faces, missing)
+    # A triangle that is kept has its corners in the same order.
+    face_of, image = np.concatenate(owner)[done.kept], np.concatenate(images)[corner[done.kept]]
+    compact = compact.reshape(-1, 3)
+    return _Meshed(every[used], compact, face_of, faces, missing, surfaces, image)
 
 
 def _joined(points: Array, faces: list[TopoDS_Shape], starts: Ints, near: float) -> Ints:

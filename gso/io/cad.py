@@ -13,7 +13,7 @@ from gso.io.raw_surface import Surface
 from gso.mesh import Mesh
 from gso.quantities import as_positive, millimetres
 from gso.spline import BSplineSurface, TrimmedSpline
-from gso.typing import AnyPath
+from gso.typing import AnyPath, Array, Ints
 
 
 class _Kit(NamedTuple):
@@ -31,6 +31,31 @@ class _Kit(NamedTuple):
 _CASCADE = _Kit("opencascade", "brep", "OCP", "OpenCASCADE (cadquery-ocp-novtk)")
 _KITS = dict.fromkeys((".step", ".stp", ".iges", ".igs"), _CASCADE)
 _KITS[".3dm"] = _Kit("rhino", "rhino", "rhino3dm", "rhino3dm")
+
+
+class Turned(NamedTuple):
+    """A face of a plane, cylinder or cone: a line (2, 3) that is turned about an axis.
+
+    By an angle in radians, about the unit vector `axis` through the point `centre`.
+    """
+
+    line: Array
+    centre: Array
+    axis: Array
+    angle: float
+
+
+class Solid(NamedTuple):
+    """A solid with a name: a closed mesh, and what is round in it.
+
+    The faces `turned` take the place of the triangles that are not among `kept` (k,).
+    """
+
+    name: str
+    mesh: Mesh
+    turned: Sequence[Turned] = ()
+    kept: Ints | None = None
+
 
 SPLINE_SUFFIXES = tuple(_KITS)
 """Suffixes of the CAD files that are read and written."""
@@ -196,16 +221,16 @@ def save_patches(patches: Sequence[TrimmedSpline], path: AnyPath, *, unit: str =
     _write(path, unit, patches)
 
 
-def save_solids(solids: Sequence[tuple[str, Mesh]], path: AnyPath) -> None:
-    """Write closed meshes in millimetres to one STEP file, as solids with names.
+def save_solids(solids: Sequence[Solid | tuple[str, Mesh]], path: AnyPath) -> None:
+    """Write solids in millimetres to one STEP file, with their names.
 
-    Triangles in one plane become one face. An existing file is replaced only when the new one is
+    Triangles in one plane become one face. Where round faces do not fit between the triangles, the
+    solid has facets instead. An existing file is replaced only when the new one is
     complete.
 
     Parameters
     ----------
-    solids : sequence of (str, Mesh)
-        Names and closed meshes.
+    solids : sequence of Solid, or of (str, Mesh)
     path : str or PathLike
         A .step or .stp file.
 

@@ -42,7 +42,12 @@ def as_mesh(x: MeshLike, *, weld: float | None = None) -> Mesh:
     Mesh(4 vertices, 1 faces, quads)
     """
     if isinstance(x, Unwelded):
-        return as_mesh(x.surface, weld=x.weld)
+        surface: Any = x.surface
+        if x.chord is not None:
+            from gso.io import load
+
+            return load(surface, weld=x.weld, chord=x.chord)
+        return as_mesh(surface, weld=x.weld)
     if isinstance(x, Mesh):
         return x if weld is None else welded(x, weld)
     if isinstance(x, (str, bytes, os.PathLike)):

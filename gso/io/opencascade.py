@@ -21,10 +21,11 @@ from OCP.BRepBuilderAPI import (
 )
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepLib import BRepLib
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
 from OCP.Geom import Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.GeomToIGES import GeomToIGES_GeomSurface
-from OCP.gp import gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d
 from OCP.IGESControl import IGESControl_Writer
 from OCP.IGESData import IGESData_IGESWriter
 from OCP.IGESSelect import IGESSelect_WorkLibrary
@@ -45,9 +46,9 @@ from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Wire
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
-from scipy.interpolate import make_interp_spline
 
 from gso.errors import MeshError
+from gso.io.cad import Solid
 from gso.mesh import Mesh
 from gso.quantities import MILLIMETRES
 from gso.spline import BSplineSurface, TrimmedSpline
@@ -66,6 +67,8 @@ _TOLERANCE = 1e-7
 
 #: Distance, relative to the size, and angle in radians within which triangles are in one plane.
 _FLAT, _LEVEL = 1e-9, 1e-6
+#: Distance, relative to the size, within which round faces and their neighbours are joined.
+_ROUND = 1e-7
 
 #: Distance, relative to the size of the largest patch, within which edges are joined.
 _SEWN = 1e-5
@@ -102,19 +105,16 @@ def write(
     return written
 
 
-def write_solids(solids: Sequence[tuple[str, Mesh]]) -> bytes:
-    """Return the contents of a STEP file of named solids, from closed meshes in millimetres.
-
-    Triangles in one plane become one face.
-    """
+def write_solids(solids: Sequence[Solid | tuple[str, Mesh]]) -> bytes:
+    """Return the contents of a STEP file of solids in millimetres; see :class:`Solid`."""
     document = TDocStd_Document(TCollection_ExtendedString("gso"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     text = io.BytesIO()
     with quiet(), settings({"write.step.unit": "MM", "xstep.cascade.unit": "MM"}):
-        for name, mesh in solids:
-            label = shapes.AddShape(_solid(mesh, name), False)
-            TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
+        for one in (Solid(*given) for given in solids):
+            label = shapes.AddShape(_round_solid(one) or _solid(one.mesh, one.name), False)
+            TDataStd_Name.Set_s(label, TCollection_ExtendedString(one.name))
         writer = STEPCAFControl_Writer()
         writer.SetNameMode(True)
         if not writer.Transfer(document):
@@ -123,10 +123,35 @@ def write_solids(solids: Sequence[tuple[str, Mesh]]) -> bytes:
     return text.getvalue()
 
 
+def _round_solid(given: Solid) -> TopoDS_Shape | None:
+    """Return a solid with round faces; None if it has none, or if they leave gaps."""
+    if not given.turned or given.kept is None:
+        return None
+    mesh = given.mesh
+    sewing = BRepBuilderAPI_Sewing(_ROUND * mesh.diagonal)
+    if len(given.kept):
+        sewing.Add(_joined(mesh.vertices, mesh.triangles[given.kept], given.name))
+    for face in given.turned:
+        ends = (gp_Pnt(*end) for end in face.line.tolist())
+        about = gp_Ax1(gp_Pnt(*face.centre.tolist()), gp_Dir(*face.axis.tolist()))
+        edge = BRepBuilderAPI_MakeEdge(*ends).Edge()
+        sewing.Add(BRepPrimAPI_MakeRevol(edge, about, face.angle).Shape())
+    sewing.Perform()
+    if sewing.NbFreeEdges() or sewing.NbMultipleEdges():
+        return None
+    solid = _inside(sewing.SewedShape(), mesh.diagonal)
+    return solid if BRepCheck_Analyzer(solid).IsValid() else None
+
+
 def _solid(mesh: Mesh, name: str) -> TopoDS_Shape:
     """Return the solid inside a closed mesh."""
-    merged = ShapeUpgrade_UnifySameDomain(_joined(mesh.vertices, mesh.triangles, name))
-    merged.SetLinearTolerance(_FLAT * mesh.diagonal)
+    return _inside(_joined(mesh.vertices, mesh.triangles, name), mesh.diagonal)
+
+
+def _inside(shell: TopoDS_Shape, size: float) -> TopoDS_Shape:
+    """Return the solid inside a closed shell; neighbours on one surface become one face."""
+    merged = ShapeUpgrade_UnifySameDomain(shell)
+    merged.SetLinearTolerance(_FLAT * size)
     merged.SetAngularTolerance(_LEVEL)
     merged.Build()
     shells = TopExp_Explorer(merged.Shape(), TopAbs_ShapeEnum.TopAbs_SHELL)
@@ -252,6 +277,9 @@ def _wire(surface: Geom_BSplineSurface, loop: Loop, straight: bool) -> TopoDS_Wi
 
 def _plane_curve(points: Array) -> Geom2d_BSplineCurve:
     """Return the curve through points (k, 2) of the parameters of a surface."""
+    # Readers do not need it.
+    from scipy.interpolate import make_interp_spline
+
     step = np.hypot(*np.diff(points, axis=0).T)
     along = np.r_[0.0, np.cumsum(step)]
     spline = make_interp_spline(along / along[-1], points, k=min(3, len(points) - 1))

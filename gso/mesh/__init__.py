@@ -3,6 +3,7 @@
 from gso.mesh.attributes import Attributes, Labels
 from gso.mesh.closest_point import Nearest
 from gso.mesh.cut import Cut, cut, joining
+from gso.mesh.given_surfaces import GivenSurface, GivenSurfaces
 from gso.mesh.mesh import Frame, Mesh
 from gso.mesh.normals import vertex_normals
 from gso.mesh.paths import Paths
@@ -14,6 +15,8 @@ __all__ = [
     "Attributes",
     "Cut",
     "Frame",
+    "GivenSurface",
+    "GivenSurfaces",
     "Labels",
     "Mesh",
     "Nearest",

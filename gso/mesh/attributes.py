@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gso.mesh.given_surfaces import GivenSurfaces
 from gso.typing import Array, Ints
 
 #: OBJ keywords that label the faces listed after them, and the kind of each label.
@@ -50,12 +51,15 @@ class Attributes:
         Texture coordinates (``vt``).
     texture_corners : ndarray of int, shaped like the faces, or None
         Row of `texture` of each corner; -1 for none.
+    surfaces : GivenSurfaces or None
+        Surfaces of a CAD file that the faces lie on; files do not keep them.
     """
 
     libraries: tuple[str, ...] = ()
     labels: Mapping[str, Labels] = field(default_factory=dict)
     texture: Array | None = None
     texture_corners: Ints | None = None
+    surfaces: GivenSurfaces | None = None
 
     @property
     def empty(self) -> bool:
@@ -79,7 +83,8 @@ class Attributes:
             if turns is not None:
                 corners = np.where(turns < 0, -1, np.take_along_axis(corners, turns, axis=1))
         labels = {k: replace(said, of_face=said.of_face[faces]) for k, said in self.labels.items()}
-        return replace(self, labels=labels, texture_corners=corners)
+        surfaces = None if self.surfaces is None else self.surfaces.taken(faces, turns)
+        return replace(self, labels=labels, texture_corners=corners, surfaces=surfaces)
 
     def __str__(self) -> str:
         parts = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from gso.quantities import Length, as_length
 from gso.recognition.flat_images import Part, RoundImage
 from gso.recognition.round_surface import RoundSurface
 from gso.typing import Array, Flags, Ints
+
+#: The angle between bend lines for a radius.
+Step: TypeAlias = Callable[[float], float]
 
 #: Chord tolerance by default, relative to the size, and the angles between which it is kept.
 _CHORD, _FINEST, _COARSEST = 1e-4, np.radians(2.0), np.radians(15.0)
@@ -47,7 +51,7 @@ class BendLine:
     limit: bool = False
 
 
-def bend_step_of(asked: Length | None, size: float, unit: str = "mm") -> Callable[[float], float]:
+def bend_step_of(asked: Length | None, size: float, unit: str = "mm") -> Step:
     """Return the function that gives the angle between bend lines, in radians, for a radius.
 
     Parameters
@@ -68,7 +72,7 @@ def bend_step_of(asked: Length | None, size: float, unit: str = "mm") -> Callabl
     Examples
     --------
     >>> float(np.degrees(bend_step_of("0.5mm", 100.0)(20.0)).round(3))
-    25.681
+    25.677
     """
     if asked is None:
         return partial(default_step, size=size)

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
 
 from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
 from gso.quantities import Length, Strain, as_length, as_strain
-from gso.recognition.bend_lines import bend_step_of, lines_of_round, lines_of_strip
+from gso.recognition.bend_lines import Step, bend_step_of, lines_of_round, lines_of_strip
 from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
+from gso.recognition.given_faces import GivenFaces
 from gso.recognition.region_growing import Region, round_regions
 from gso.recognition.round_surface import RoundSurface
 from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
 from gso.typing import Array, Flags, Ints, MeshLike
-
-#: The angle between bend lines for a radius.
-Step: TypeAlias = Callable[[float], float]
 
 #: Triangles of a smooth face at least, where more than this share of the area is free.
 _FEW, _MOSTLY = 12, 0.5
@@ -76,6 +72,8 @@ def recognise(
     and more than three times the upper quartile. Eight flat sides with folds of 45 degrees
     therefore stay folds, and twelve with 30 degrees are a tube. One row of facets between
     circles with smooth folds is no proof of straight rulings: a sphere consists of such rows.
+    Faces of STEP and IGES files have the equations that the file gives them, if their vertices
+    still lie on them.
 
     Examples
     --------
@@ -94,10 +92,12 @@ def recognise(
     limit = as_strain(max_strain, "max_strain")
     graph = FacetGraph.of(surface, allowed)
     step = bend_step_of(bend_step, surface.diagonal, unit)
-    regions = round_regions(graph)
+    given = None if surface.attributes is None else surface.attributes.surfaces
+    known = GivenFaces.of(graph, given)
+    regions = [*known.regions, *round_regions(graph, known.unknown)]
     rest = np.ones(len(graph.triangles), bool)
-    for region in regions:
-        rest &= ~region.member
+    for member in (*(region.member for region in regions), *known.torsal):
+        rest &= ~member
     patches = other_patches(graph, rest)
     graph, source, seams = _opened(graph, regions)
     faces = [
@@ -105,6 +105,7 @@ def recognise(
         for region, seam in zip(regions, seams, strict=True)
     ]
     faces += _other_faces(graph, patches, source, limit)
+    faces += known.torsal_faces(graph, source, step)
     faces.sort(key=lambda face: int(face.triangles[0]))
     return Recognised(graph.points, graph.triangles, source, tuple(faces), graph.tolerance)
 

@@ -70,16 +70,16 @@ class Region:
     member: Flags
 
 
-def round_regions(graph: FacetGraph) -> list[Region]:
-    """Find all cylinders and cones of a mesh; regions do not overlap.
+def round_regions(graph: FacetGraph, free: Flags) -> list[Region]:
+    """Find all cylinders and cones among some triangles (t,); regions do not overlap.
 
     Whole smooth parts of the mesh are tried first, then the surroundings of every facet.
     """
-    free = np.ones(len(graph.triangles), bool)
+    free = free.copy()
     found: list[Region] = []
     smooth = np.abs(graph.folds) <= SMOOTH
     label = graph.connected(free, smooth)
-    count = np.bincount(label)
+    count = np.bincount(label[label >= 0], minlength=1)
     for part in np.argsort(-count, kind="stable")[:_PARTS]:
         if count[part] < 3:
             break
@@ -95,6 +95,12 @@ def round_regions(graph: FacetGraph) -> list[Region]:
     for rings in (2, 1):
         found += _from_seeds(graph, free, rings, along=True)
     return found
+
+
+def round_region(graph: FacetGraph, member: Flags) -> Region | None:
+    """Fit a cylinder or cone to all of some triangles (t,); None if they are on none."""
+    found = _best(graph, member, member, np.zeros(0, bool), None)
+    return found if found is not None and (found.member == member).all() else None
 
 
 def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = False) -> list[Region]:

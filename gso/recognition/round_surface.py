@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.geometry.vectors import cross
 from gso.typing import Array, Flags
 
 #: Steps of Gauss-Newton at most, and the damping at the start.
@@ -242,9 +243,9 @@ def fit_quadrics(points: Array, given: Flags) -> tuple[Array, Array]:
 def _frames(axis: Array) -> tuple[Array, Array]:
     """Return two unit vectors across each axis (b, 3), right-handed with it."""
     least = np.eye(3)[np.abs(axis).argmin(axis=1)]
-    e1 = np.cross(least, axis)
+    e1 = cross(least, axis)
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
-    return e1, np.cross(axis, e1)
+    return e1, cross(axis, e1)
 
 
 def _linear_start(

@@ -50,6 +50,9 @@ class ShapeFace:
         In the plane of `flat`.
     bend_angle : float
         Angle by which the face turns in all, in radians; 0 for planes and free faces.
+    normals : (ndarray of int, ndarray), or None
+        Vertices (n,), increasing, of a torsal face of a CAD file, and unit normals (n, 3) of its
+        surface there.
     """
 
     kind: Kind
@@ -64,6 +67,15 @@ class ShapeFace:
     seam: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
     bend_lines: tuple[BendLine, ...] = ()
     bend_angle: float = 0.0
+    normals: tuple[Ints, Array] | None = None
+
+    def normals_at(self, vertices: Ints) -> Array:
+        """Return :attr:`normals` at vertices (...,), NaN where there are none; (..., 3)."""
+        if self.normals is None:
+            return np.full((*vertices.shape, 3), np.nan)
+        known, normals = self.normals
+        at = np.minimum(np.searchsorted(known, vertices), len(known) - 1)
+        return np.where((known[at] == vertices)[..., None], normals[at], np.nan)
 
     @property
     def radius(self) -> float | None:

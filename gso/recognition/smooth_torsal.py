@@ -9,7 +9,6 @@ import numpy as np
 from gso import geometry
 from gso.errors import MeshError
 from gso.mesh import Mesh, topology
-from gso.parametrization import low_strain
 from gso.recognition.bend_lines import BendLine
 from gso.rulings import shape_operator, trace
 from gso.typing import Array, Flags, Ints
@@ -71,6 +70,9 @@ def smooth_image(points: Array, triangles: Ints, limit: float) -> SmoothImage | 
     loops = len(mesh.boundary_loops)
     if not loops or mesh.euler_characteristic != 2 - loops or _total_curvature(mesh) > _CURVED:
         return None
+    # Most designs have no such face.
+    from gso.parametrization import low_strain
+
     flat = low_strain(mesh).flat
     areas = geometry.signed_areas(flat, mesh.triangles)
     strain = _largest_strain(mesh, flat)

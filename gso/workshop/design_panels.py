@@ -8,19 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso import parametrization
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.exact import folded_pattern
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
-from gso.ruled.paneling.lay_strips import lay_strips
-from gso.ruled.paneling.light_design import LightDesign
-from gso.ruled.paneling.options import RULED, Options
-from gso.ruled.paneling.strips_request import StripsRequest
-from gso.seams import pieces as search
-from gso.tasks.request import Limits
-from gso.tno import optimize
 from gso.verdict import compare, crosses_itself
 from gso.verdict.surface_checks import crossed
 from gso.workshop import measurements
@@ -92,7 +84,7 @@ def made(
 
 def _changed(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make a design of flat panels in the way that was asked for."""
-    if settings.formulation == RULED:
+    if settings.formulation == "ruled":
         return _strips(given, settings, say, workers)
     if settings.formulation == "flatten":
         return _as_it_is(given, settings, say)
@@ -164,12 +156,11 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         found.pattern,
         settings,
         settings.distance(given.mesh.diagonal),
+        is_kept=True,
     )
     # By the equations of the faces: chords of the mesh are shorter than the arcs of the pattern.
     record |= {
         "pieces": found.parts,
-        "deviation_mean": 0.0,
-        "deviation_max": 0.0,
         "strain_max": found.strain,
         "strain_p99": found.strain,
         "thickness": thick,
@@ -188,6 +179,12 @@ def _press_radius(given: Design, settings: FabricationSettings) -> tuple[float, 
 
 def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make strips, of the whole design or of its pieces."""
+    # Designs that are developable as they are do not wait for these imports.
+    from gso.ruled.paneling.lay_strips import lay_strips
+    from gso.ruled.paneling.options import Options
+    from gso.ruled.paneling.strips_request import StripsRequest
+    from gso.tasks.request import Limits
+
     options = Options(max_strips=settings.max_strips, min_radius=settings.min_radius)
     allowed = settings.distance(given.mesh.diagonal)
     limits = Limits(allowed, settings.strain)
@@ -221,6 +218,10 @@ def _as_it_is(given: Design, settings: FabricationSettings, say: Say) -> Made:
 
 def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make nearly developable panels: one if that is possible, otherwise several."""
+    from gso import parametrization
+    from gso.ruled.paneling.light_design import LightDesign
+    from gso.tno import optimize
+
     light = LightDesign.of(
         given.mesh, settings.distance(given.mesh.diagonal), named=len(given.kept) > 0
     )
@@ -260,6 +261,8 @@ def _of_search(
     workers: int | None,
 ) -> Made:
     """Search for seams within a distance, and make a panel of each piece."""
+    from gso.seams import pieces as search
+
     found = search(
         # On triangles seams need not follow edge rows.
         Mesh(mesh.vertices, mesh.triangles),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
-from gso.io import SPLINE_SUFFIXES, suffix_of
+from gso.io import SPLINE_SUFFIXES, Solid, suffix_of
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import (
@@ -180,7 +180,8 @@ def fabricate(
         radius.
     step : bool
         Also write the folded parts as solids of the sheet's thickness to one STEP file,
-        ``folded.step``. Their bends have flat facets as the designs have them.
+        ``folded.step``. Bends that are cylinders or cones between two rulings and two circles are
+        so there; others have flat facets as the designs have them.
     workers : int, optional
         Number of processes; one for each processor when not given, 0 for none.
     scheduler : str, optional
@@ -266,7 +267,7 @@ def fabricate(
     say("parts")
     # Parts are the same only if their sheets are.
     of_sheet: dict[float | None, list[Part]] = {}
-    solids: list[tuple[str, Mesh]] = []
+    solids: list[Solid] = []
     records: list[Json] = []
     reasons: list[Reason] = []
     notes = [note for design in every for note in design.notes]

@@ -37,7 +37,7 @@ def opened(place: Path, inputs: Iterable[object]) -> set[str]:
     Returns
     -------
     set of str
-        The drawings and surfaces that an earlier run wrote.
+        The drawings, surfaces and solids that an earlier run wrote.
 
     Raises
     ------
@@ -74,7 +74,8 @@ def opened(place: Path, inputs: Iterable[object]) -> set[str]:
     files = _certificate(place) or []
     why = [failure(Code.UNFINISHED).record("mm")]
     write_json(place / CERTIFICATE, {"usable": False, "reasons": why, "files": files})
-    return {n for n in files if n.count("/") == 1 and n.split("/")[0] in FOLDERS and ".." not in n}
+    drawn = {n for n in files if n.count("/") == 1 and n.split("/")[0] in FOLDERS and ".." not in n}
+    return drawn | ({PAPER, SOLIDS} & set(files))
 
 
 def path_of(given: object) -> Path | None:

@@ -9,6 +9,7 @@ from gso.errors import MeshError
 from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
+from gso.metrics import Distances
 from gso.pattern import Pattern
 from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge
@@ -29,9 +30,14 @@ def of_pattern(
     pattern: Pattern,
     settings: FabricationSettings,
     allowed: float | None,
+    *,
+    is_kept: bool = False,
 ) -> Json:
-    """Measure a surface and its pattern; `allowed` is the largest distance from the design."""
-    away = metrics.surface_distance(design, surface)
+    """Measure a surface and its pattern; `allowed` is the largest distance from the design.
+
+    With `is_kept` the surface is the design, divided into more triangles.
+    """
+    away = Distances(0, 0, 0, 0) if is_kept else metrics.surface_distance(design, surface)
     sheet = pattern.surface(surface)
     strains = metrics.strains(sheet, pattern.flat)
     overlaps = len(faults.overlaps(sheet, pattern.flat))
@@ -44,7 +50,7 @@ def of_pattern(
         "allowed": allowed,
         "deviation_mean": away.mean,
         "deviation_max": away.largest,
-        "deviation_at": _worst(design, surface),
+        "deviation_at": surface.vertices[0].tolist() if is_kept else _worst(design, surface),
         "strain_max": strains["strain_max"],
         "strain_p99": strains["strain_p99"],
         "curvature": _curvatures(pattern.surface(surface)),

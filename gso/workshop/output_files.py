@@ -8,7 +8,6 @@ from pathlib import Path
 
 from gso import io
 from gso.io.atomic import write_bytes
-from gso.mesh import Mesh
 from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER, SOLIDS
@@ -74,7 +73,7 @@ def written(
     certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
-    solids: Sequence[tuple[str, Mesh]] = (),
+    solids: Sequence[io.Solid] = (),
 ) -> list[str]:
     """Write all files but the certificate; delete earlier ones that are not written again."""
     files: list[str] = []
