@@ -38,7 +38,6 @@ _DEVELOPABLE = (
     "d_H",
     "distance_mean",
     "distance_max",
-    "deviation_max",
     "fairness_ratio",
 )
 _FLATTEN = (

@@ -50,7 +50,10 @@ def solve_and_judge(run: Run) -> Result:
     best = solves.usable(request)
     before = case.task.formulations[request.formulation].before
     judged = request.verdict and best.status is not Status.ALREADY_GOOD
-    begun = before(request) if before is not None and judged and solves.may_go_on else None
+    own = request
+    if run.start_refused:
+        own = replace(request, x0=None)
+    begun = before(own) if before is not None and judged and solves.may_go_on else None
     if begun is not None and case.constraints.empty:
         other = solves.usable(begun)
         if _is_worse(best, other):

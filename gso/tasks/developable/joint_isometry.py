@@ -92,8 +92,8 @@ class Options(BaseOptions):
         Stopping threshold: the remaining stages of lower fairness are skipped when the mean
         squared isometry defect is at most this.
     begin : {"curvature", "design"}
-        Start from the result of the formulation "curvature", or from the design itself.
-        Ignored with `x0` or constraints, which determine their own start.
+        Start from the result of the formulation "curvature", or from the design itself, as
+        published: then curvature that coarse quads hide is not looked for. The start is ignored with `x0` or constraints, which determine their own start.
     variables : {"free", "surface"}
         Free vertices, or (on grids) a last stage in the control points of a bicubic B-spline
         surface, returned as the result's `spline`.
@@ -203,7 +203,7 @@ def plan(
         start.ravel(),
         [*before, *stages],
         further=None
-        if spline is not None
+        if spline is not None or options.begin == "design"
         else hidden_curvature.further(mesh, options.developable_below, stages[-1], bent),
         notes=opened.notes,
         finish=partial(flat_image.place, mesh, cut),
