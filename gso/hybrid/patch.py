@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 from scipy.sparse import diags, identity, kron
 
 from gso import geometry, parametrization
@@ -45,6 +44,8 @@ class Patch:
 
     def at_vertices(self, values: Array) -> Array:
         """Interpolate values (size, size, d) on the grid at those vertices, (n, d)."""
+        from scipy.interpolate import RectBivariateSpline
+
         sides = (np.linspace(0.0, 1.0, n) for n in values.shape[:2])
         u, v = sides
         columns = [
