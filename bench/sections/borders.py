@@ -31,7 +31,7 @@ def _figures(design: designs.Design, after: gso.Mesh) -> dict[str, Any]:
         "asymmetry": design.asymmetry(after.vertices) if design.symmetries else "",
         "one way %": percent * true.there_max,
         "both ways %": percent * both,
-        "mean %": percent * true.mean,
+        "mean %": percent * 0.5 * (true.there_mean + true.back_mean),
         "fold in": metrics.dihedral_angles(before).max(),
         "fold": metrics.dihedral_angles(after).max(),
         "|K| in": metrics.loss_gc_worst(before),

@@ -33,7 +33,7 @@ INFO: dict[str, Info] = {
     "nonplanarity_max": Info("", True, "largest gap of a quad's diagonals / mean edge", "max"),
     "nonplanarity_max_before": Info("", True, "nonplanarity_max of the input", "max"),
     "d_H": Info("%", True, "mean distance to the nearest input vertex / diagonal (published)"),
-    "distance_mean": Info("%", True, "mean true distance, the larger way / diagonal"),
+    "distance_mean": Info("%", True, "mean true distance, both ways (strips: larger) / diagonal"),
     "distance_max": Info("%", True, "largest true distance, both ways / diagonal", "max"),
     "displacement_rms": Info("%", True, "root mean square vertex displacement / diagonal"),
     "displacement_max": Info("%", True, "largest vertex displacement / diagonal", "max"),

@@ -54,7 +54,7 @@ def metrics(before: Mesh, after: Mesh, flat: Array | None, scale: float) -> dict
         "K_A_r": measure.K_A_r(before, after),
         "K_A_r_worst": measure.K_A_r_worst(before, after),
         "d_H": measure.d_H(before, after),
-        "distance_mean": percent * true.mean,
+        "distance_mean": percent * 0.5 * (true.there_mean + true.back_mean),
         "distance_max": percent * true.largest,
         "fairness_ratio": measure.fairness_ratio(before, after),
         "fold_max_before": float(measure.dihedral_angles(before).max(initial=0.0)),

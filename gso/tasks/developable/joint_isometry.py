@@ -93,7 +93,8 @@ class Options(BaseOptions):
         squared isometry defect is at most this.
     begin : {"curvature", "design"}
         Start from the result of the formulation "curvature", or from the design itself, as
-        published: then curvature that coarse quads hide is not looked for. The start is ignored with `x0` or constraints, which determine their own start.
+        published: then curvature that coarse quads hide is not looked for. Ignored with `x0` or
+        constraints, which determine their own start.
     variables : {"free", "surface"}
         Free vertices, or (on grids) a last stage in the control points of a bicubic B-spline
         surface, returned as the result's `spline`.
