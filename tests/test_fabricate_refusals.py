@@ -36,7 +36,7 @@ def cylinder():
 @pytest.fixture(scope="module")
 def folded_cylinder(cylinder):
     """The same panel, whose bends are folded as those of strips are."""
-    return replace(cylinder, panels=tuple(replace(p, rolled=~p.rolled) for p in cylinder.panels))
+    return replace(cylinder, panels=tuple(replace(p, zone=0 * p.zone - 1) for p in cylinder.panels))
 
 
 @pytest.fixture(scope="module")
