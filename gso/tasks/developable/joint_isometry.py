@@ -203,9 +203,11 @@ def plan(
         flat_image.layout_of(mesh, cut),
         start.ravel(),
         [*before, *stages],
-        further=None
-        if spline is not None or options.begin == "design"
-        else hidden_curvature.further(mesh, options.developable_below, stages[-1], bent),
+        # Over more stages rounding grows, and symmetric designs lose their symmetry: other solves
+        # than the one that was asked for have none.
+        further=hidden_curvature.further(mesh, options.developable_below, stages[-1], bent)
+        if spline is None and options.begin == "curvature" and request.formulation_given
+        else None,
         notes=opened.notes,
         finish=partial(flat_image.place, mesh, cut),
         result_notes=partial(flat_image.notes, mesh, cut),
