@@ -122,4 +122,4 @@ def test_a_sample_of_damaged_designs_ends_in_parts_or_own_errors(tmp_path):
 @pytest.mark.filterwarnings("ignore")
 def test_damaged_designs_end_in_parts_or_own_errors(tmp_path):
     found = counted(range(FULL), tmp_path)
-    assert min(found.values()) > FULL // 20
+    assert min(found.values()) > FULL // 30
