@@ -9,7 +9,7 @@ import numpy as np
 
 from gso.exact.ruling_rows import levels, ruling_rows
 from gso.exact.sliced_pattern import SlicedPattern
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.pattern import Folded, Zone
 from gso.recognition import BendLine, ShapeFace
 from gso.typing import Array, Flags
@@ -84,7 +84,7 @@ def _on_lines(
 ) -> Folded:
     """Return the edges of a face on its lines, with the angles and radii of its bends."""
     edges = sliced.edges_of(number)
-    inner = np.isin(edge_keys(edges[:, 0], edges[:, 1], len(sliced.flat)), sliced.inner())
+    inner = np.isin(pair_keys(edges, len(sliced.flat)), sliced.inner())
     on = [inner & line.carries(sliced.flat[edges], near) for line in lines]
     found = [Folded()]
     for line, bend, own in zip(lines, _weighted(bends, lines, on), on, strict=True):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.exact.sliced_pattern import SlicedPattern
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.pattern import Folded
 from gso.recognition import RoundSurface, ShapeFace
 from gso.typing import Array, Flags, Ints
@@ -107,7 +107,7 @@ def ruling_rows(sliced: SlicedPattern, face: ShapeFace, flat: Array, count: int)
     own = sliced.faces[face.triangles]
     ahead = (rows.corner + 1) % 3
     edges = np.stack([own[rows.triangle, rows.corner], own[rows.triangle, ahead]], axis=1)
-    keys = edge_keys(edges[:, 0], edges[:, 1], len(sliced.flat))
+    keys = pair_keys(edges, len(sliced.flat))
     inner = np.isin(keys, sliced.inner())
     weight = np.zeros(len(chosen) + 2)
     weight[:-1] += 0.5 * gaps

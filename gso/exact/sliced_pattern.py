@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.mesh.slicing import subdivided
-from gso.mesh.topology import edge_keys, label_components
+from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.recognition import Recognised
 from gso.typing import Array, Ints
 from gso.unfolding import Joined
@@ -72,7 +72,7 @@ class SlicedPattern:
         both = np.concatenate([edges, copy[seamed]])
         every = np.concatenate([shares, shares[seamed]])
         number = n + np.concatenate([np.arange(len(edges)), np.flatnonzero(seamed)])
-        _, once = np.unique(edge_keys(both[:, 0], both[:, 1], count), return_index=True)
+        _, once = np.unique(pair_keys(both, count), return_index=True)
         once.sort()
         both, every, number = both[once], every[once], number[once]
         a, b = self.vertex[edges].T
@@ -92,7 +92,7 @@ class SlicedPattern:
             return out
         sides = self.seams.transpose(1, 0, 2).reshape(-1, 2)
         others = self.seams[:, ::-1].transpose(1, 0, 2).reshape(-1, 2)
-        place = _places(_keys(sides, count), _keys(edges, count))
+        place = _places(pair_keys(sides, count), pair_keys(edges, count))
         hit = place >= 0
         same = sides[place[hit], 0] == edges[hit, 0]
         out[hit] = np.where(same[:, None], others[place[hit]], others[place[hit], ::-1])
@@ -100,8 +100,8 @@ class SlicedPattern:
 
     def _halved(self, edges: Ints, count: int) -> Ints:
         """Replace seams whose edges are divided by their halves."""
-        keys = _keys(edges, count)
-        middle = [_places(keys, _keys(self.seams[:, side], count)) for side in (0, 1)]
+        keys = pair_keys(edges, count)
+        middle = [_places(keys, pair_keys(self.seams[:, side], count)) for side in (0, 1)]
         hit = middle[0] >= 0
         one, other = self.seams[hit].transpose(1, 0, 2)
         m, w = (count + part[hit] for part in middle)
@@ -120,10 +120,6 @@ class SlicedPattern:
         keys = edge_keys(self.faces, np.roll(self.faces, -1, axis=1), len(self.flat)).ravel()
         found, often = np.unique(keys, return_counts=True)
         return np.asarray(found[often == 2])
-
-
-def _keys(edges: Ints, count: int) -> Ints:
-    return edge_keys(edges[:, 0], edges[:, 1], count)
 
 
 def _places(keys: Ints, wanted: Ints) -> Ints:

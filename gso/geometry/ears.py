@@ -69,7 +69,7 @@ def ears(polygon: Array, *, simple: bool = True) -> Ints:
     Of the corners that can be cut off, the one whose triangle is the least thin comes first, so
     that points on straight sides give no triangles without area. Corners may repeat, as where a
     hole is joined to the outline by a bridge. Polygons that cross themselves are divided, too, if
-    `simple` is false; some of their triangles are then turned over.
+    `simple` is false; some of their triangles are then inverted.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from gso.errors import MeshError
 from gso.mesh.mesh import Mesh
-from gso.mesh.topology import edge_graph, edge_keys, label_components
+from gso.mesh.topology import edge_graph, edge_keys, label_components, pair_keys
 from gso.typing import Ints
 
 #: Relative difference below which two path lengths count as equal.
@@ -77,7 +77,7 @@ def cut(mesh: Mesh, edges: ArrayLike) -> Cut:
     """
     he, n = mesh.half_edges, len(mesh.vertices)
     wanted = np.asarray(edges, dtype=np.int64).reshape(-1, 2)
-    keys, own = edge_keys(wanted[:, 0], wanted[:, 1], n), edge_keys(he.origin, he.dest, n)
+    keys, own = pair_keys(wanted, n), edge_keys(he.origin, he.dest, n)
     inside = ((wanted >= 0) & (wanted < n)).all(axis=1)
     missing = np.flatnonzero(~(inside & np.isin(keys, own)))
     if missing.size:

@@ -225,7 +225,7 @@ class Mesh:
     def edge_numbers(self, a: Ints, b: Ints) -> Ints:
         """Return the rows of :attr:`edges` that join vertices a and b, in either direction."""
         ends, count = self.edges, len(self.vertices)
-        keys = topology.edge_keys(ends[:, 0], ends[:, 1], count)
+        keys = topology.pair_keys(ends, count)
         order = np.argsort(keys)
         return order[np.searchsorted(keys[order], topology.edge_keys(a, b, count))]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_keys, pair_keys
 from gso.typing import Array, Ints
 
 
@@ -81,7 +81,7 @@ def subdivided(f: Ints, n: int, edges: Ints) -> tuple[Ints, Ints]:
     owner : ndarray of int, (u,)
         The triangle that each is a part of.
     """
-    key = edge_keys(edges[:, 0], edges[:, 1], n)
+    key = pair_keys(edges, n)
     order = np.argsort(key)
     sides = edge_keys(f, np.roll(f, -1, axis=1), n)
     place = np.minimum(np.searchsorted(key[order], sides), len(key) - 1)

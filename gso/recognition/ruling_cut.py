@@ -55,7 +55,7 @@ def _crossed(
     edge, share = np.concatenate(ends), np.concatenate(shares)
     turned = edge[:, 0] > edge[:, 1]
     edge[turned], share[turned] = edge[turned][:, ::-1], 1.0 - share[turned]
-    keys = topology.edge_keys(edge[:, 0], edge[:, 1], len(part.points))
+    keys = topology.pair_keys(edge, len(part.points))
     first = np.unique(keys, return_index=True)[1]
     return edge[first], share[first]
 

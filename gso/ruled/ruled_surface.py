@@ -13,7 +13,7 @@ from gso import faults, metrics
 from gso.errors import MeshError
 from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.pattern import Bend, Folded, Pattern
 from gso.ruled.fold_lines import Folds, folds
 from gso.ruled.sheet import unrolled_pattern
@@ -114,9 +114,7 @@ class RuledSurface:
         k = np.flatnonzero((inner.twin >= 0) & (inner.origin < inner.dest))
         ends = np.stack([inner.origin[k], inner.dest[k]], axis=1)
         count = len(self.mesh.vertices)
-        key, rulings = (
-            edge_keys(e[:, 0], e[:, 1], count) for e in (pattern.vertex[ends], self.rulings.edges)
-        )
+        key, rulings = (pair_keys(e, count) for e in (pattern.vertex[ends], self.rulings.edges))
         order = np.argsort(rulings)
         at = order[np.minimum(np.searchsorted(rulings[order], key), len(order) - 1)]
         found = np.isin(key, rulings)

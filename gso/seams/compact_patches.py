@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from gso.mesh import Mesh
 from gso.mesh.separation import centres
-from gso.mesh.topology import edge_graph, edge_keys
+from gso.mesh.topology import edge_graph, edge_keys, pair_keys
 from gso.typing import Ints
 
 
@@ -19,7 +19,7 @@ def patches(mesh: Mesh, count: int, kept: Ints) -> Ints:
     """
     he, n = mesh.half_edges, len(mesh.vertices)
     k = he.interior
-    cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), edge_keys(kept[:, 0], kept[:, 1], n))
+    cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), pair_keys(kept, n))
     k = k[~cut]
     centre = centres(mesh)
     f, g = he.face[k], he.face[he.twin[k]]

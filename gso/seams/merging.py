@@ -6,7 +6,7 @@ import heapq
 
 import numpy as np
 
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.seams.tree import Ground
 from gso.typing import Ints
 
@@ -40,8 +40,8 @@ class Merging:
         #: What an edge costs as a part of a seam.
         self._cost = self._length if factor is None else self._length * factor
         n = len(mesh.vertices)
-        kept = edge_keys(ground.kept[:, 0], ground.kept[:, 1], n)
-        self._kept = np.isin(edge_keys(self._ends[:, 0], self._ends[:, 1], n), kept)
+        kept = pair_keys(ground.kept, n)
+        self._kept = np.isin(pair_keys(self._ends, n), kept)
         rim = np.flatnonzero(he.twin < 0)
         self._rim = np.bincount(
             he.face[rim],

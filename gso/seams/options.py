@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from gso.errors import OptionError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.quantities import as_positive
 from gso.typing import Array, Ints
 from gso.verdict import Code
@@ -105,7 +105,7 @@ def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Arra
         if len(beyond):
             a, b = beyond[0]
             raise OptionError(f"along has the pair {a}-{b}; vertices are 0 to {n - 1}")
-        keys, own = (edge_keys(pairs[:, 0], pairs[:, 1], n) for pairs in (wanted, ends))
+        keys, own = (pair_keys(pairs, n) for pairs in (wanted, ends))
         missing = np.flatnonzero(~np.isin(keys, own))
         if missing.size:
             a, b = wanted[missing[0]]

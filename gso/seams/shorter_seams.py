@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.mesh.topology import edge_keys, label_components
+from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.seams.chains import chains
 from gso.seams.merging import Merging
 from gso.seams.tree import Ground
@@ -67,7 +67,7 @@ def _still(merging: Merging, label: Ints, a: int, b: int, line: Ints) -> bool:
     own = ends[(pair[:, 0] == min(a, b)) & (pair[:, 1] == max(a, b))]
     n = int(max(own.max(initial=0), line.max())) + 1
     keys = edge_keys(line[:-1], line[1:], n)
-    return bool(np.isin(keys, edge_keys(own[:, 0], own[:, 1], n)).all())
+    return bool(np.isin(keys, pair_keys(own, n)).all())
 
 
 def _shorter(

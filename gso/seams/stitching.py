@@ -15,7 +15,7 @@ from gso.errors import MeshError
 from gso.geometry.polygon import arc_lengths
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_keys, pair_keys
 from gso.seams.chains import chains
 from gso.seams.sheets import Sheet, flattened
 from gso.seams.tree import Ground
@@ -71,13 +71,13 @@ def stitched(
     """
     mesh = ground.mesh
     n = len(mesh.vertices)
-    kept = set(edge_keys(ground.kept[:, 0], ground.kept[:, 1], n).tolist())
+    kept = set(pair_keys(ground.kept, n).tolist())
     members = {k: piece.faces for k, piece in enumerate(pieces)}
     known = dict(enumerate(sheets))
     # Small pieces may be joined along seams shorter than a neck: they are not wider.
     size = {k: _wide(sheet, least) for k, sheet in known.items()}
     root = list(range(len(members)))
-    every = edge_keys(pieces.edges[:, 0], pieces.edges[:, 1], n).tolist()
+    every = pair_keys(pieces.edges, n).tolist()
     sides = dict(zip(every, pieces.sides.tolist(), strict=True))
     cut_keys = set(every)
     spans = chains(pieces.edges, pieces.sides)

@@ -9,7 +9,7 @@ import numpy as np
 from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
 from gso.mesh.slicing import divided
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_keys, pair_keys
 from gso.seams.chains import chains
 from gso.seams.walking import Walker
 from gso.typing import Array, Ints
@@ -40,9 +40,9 @@ def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
     mesh, n = pieces.design, len(pieces.design.vertices)
     step = float(pieces.lengths.mean()) if len(pieces.edges) else 0.0
     walker = Walker(mesh)
-    seam = set(edge_keys(pieces.edges[:, 0], pieces.edges[:, 1], n).tolist())
+    seam = set(pair_keys(pieces.edges, n).tolist())
     kept = kept.reshape(-1, 2)
-    fixed = set(edge_keys(kept[:, 0], kept[:, 1], n).tolist())
+    fixed = set(pair_keys(kept, n).tolist())
     on_seam = set(np.unique(pieces.edges).tolist())
     taken: set[int] = set()
     divided_keys: set[int] = set()
@@ -62,7 +62,7 @@ def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
                 lines.append(part)
                 continue
             ends = np.array(found.edges, np.int64).reshape(-1, 2)
-            own = edge_keys(ends[:, 0], ends[:, 1], n).tolist()
+            own = pair_keys(ends, n).tolist()
             along = [
                 int(edge_keys(np.array(one), np.array(two), n))
                 for one, two in pairwise(found.stops)

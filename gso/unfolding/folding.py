@@ -6,7 +6,7 @@ import numpy as np
 
 from gso.geometry import closest_motion
 from gso.geometry.vectors import unit
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.pattern import Folded
 from gso.typing import Array, Ints
 from gso.unfolding.dual_edges import DualEdges
@@ -14,8 +14,8 @@ from gso.unfolding.dual_edges import DualEdges
 
 def angles_at(edges: DualEdges, folded: Folded, count: int) -> Array:
     """Return the angles of folds at edges, 0 at others, for `count` vertices."""
-    keys = edge_keys(folded.edges[:, 0], folded.edges[:, 1], count)
-    own = edge_keys(edges.ends[:, 0], edges.ends[:, 1], count)
+    keys = pair_keys(folded.edges, count)
+    own = pair_keys(edges.ends, count)
     if not len(keys):
         return np.zeros(len(own))
     order = np.argsort(keys)

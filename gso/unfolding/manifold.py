@@ -12,7 +12,7 @@ from gso.errors import MeshError, NonManifoldError, OptionError
 from gso.geometry.vectors import unit
 from gso.io.raw_surface import Surface
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys, label_components
+from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.mesh.validation import checked_table, checked_vertices
 from gso.typing import Array, Flags, Ints, MeshLike
 
@@ -75,9 +75,9 @@ def edges_between(mesh: Mesh, vertex: Ints, pairs: ArrayLike | None, name: str) 
     if given.ndim != 2 or given.shape[1] != 2 or given.dtype.kind not in "iu":
         raise OptionError(f"{name} must be pairs of vertices, (k, 2), not {given.shape}")
     count = max(int(vertex.max()), int(np.abs(given).max())) + 1
-    wanted = edge_keys(given[:, 0], given[:, 1], count)
+    wanted = pair_keys(given, count)
     own = vertex[mesh.edges]
-    keys = edge_keys(own[:, 0], own[:, 1], count)
+    keys = pair_keys(own, count)
     bad = np.flatnonzero((given < 0).any(axis=1) | ~np.isin(wanted, keys))
     if len(bad):
         a, b = given[bad[0]]

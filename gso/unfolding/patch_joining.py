@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from gso.errors import MeshError, OptionError
 from gso.geometry import area_vectors
 from gso.geometry.vectors import unit
-from gso.mesh.topology import edge_keys, label_components
+from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.typing import Array, Flags, Ints
 from gso.unfolding.canonical_order import canonical_order, classes
 from gso.unfolding.contact import boxes, overlapping
@@ -174,12 +174,12 @@ def _marked(edges: DualEdges, given: ArrayLike, count: int, name: str, triangles
     pairs = np.asarray(given if np.size(given) else np.empty((0, 2)), np.int64).reshape(-1, 2)
     origin, dest = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     inside = ((pairs >= 0) & (pairs < count)).all(axis=1)
-    keys = edge_keys(pairs[:, 0], pairs[:, 1], count)
+    keys = pair_keys(pairs, count)
     missing = np.flatnonzero(~(inside & np.isin(keys, edge_keys(origin, dest, count))))
     if len(missing):
         a, b = pairs[missing[0]]
         raise OptionError(f"{name}: {a}-{b} is no edge of a face ({len(missing)} such pairs)")
-    return np.isin(edge_keys(edges.ends[:, 0], edges.ends[:, 1], count), keys)
+    return np.isin(pair_keys(edges.ends, count), keys)
 
 
 def _planes(points: Array, triangles: Ints, edges: DualEdges, smooth: Flags) -> tuple[Ints, Array]:

@@ -8,7 +8,7 @@ from gso import faults, metrics, rulings
 from gso.errors import MeshError
 from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_keys, pair_keys
 from gso.metrics import Distances
 from gso.pattern import Pattern
 from gso.typing import Json
@@ -109,7 +109,7 @@ def _unmarked_fold(panel: Panel) -> float:
     he, count = panel.surface.half_edges, len(panel.flat)
     inner = he.interior
     keys = edge_keys(he.origin[inner], he.dest[inner], count)
-    bent = edge_keys(panel.bends[:, 0], panel.bends[:, 1], count)
+    bent = pair_keys(panel.bends, count)
     angles = metrics.dihedral_angles(panel.surface)
     return float(angles[~np.isin(keys, bent)].max(initial=0.0))
 

@@ -12,7 +12,7 @@ from gso.cut_pieces import Pieces
 from gso.exact import developable_parts
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import edge_keys, pair_keys
 from gso.typing import Ints, Json
 from gso.verdict import compare
 from gso.verdict.surface_checks import crossed
@@ -60,8 +60,8 @@ def mixed(given: Design, settings: FabricationSettings, keep: _Make, change: _Ma
         local = np.full(len(mesh.vertices), -1)
         local[piece.vertices] = np.arange(len(piece.vertices))
         edges = local[given.kept]
-        keys = edge_keys(piece.mesh.edges[:, 0], piece.mesh.edges[:, 1], len(local))
-        edges = edges[np.isin(edge_keys(edges[:, 0], edges[:, 1], len(local)), keys)]
+        keys = pair_keys(piece.mesh.edges, len(local))
+        edges = edges[np.isin(pair_keys(edges, len(local)), keys)]
         part = replace(given, name=f"{given.name}-{piece.name}", mesh=piece.mesh, kept=edges)
         made = (keep if kept[piece.faces[0]] else change)(part, own)
         if made is None:
@@ -107,7 +107,7 @@ def _rim(panel: Panel, seams: Sequence[Side]) -> Ints:
     for side in seams:
         ends = side.edges[:, 0]
         known += [edge_keys(ends[:-1], ends[1:], count), edge_keys(ends, side.edges[:, 1], count)]
-    return rim[~np.isin(edge_keys(rim[:, 0], rim[:, 1], count), np.concatenate(known))]
+    return rim[~np.isin(pair_keys(rim, count), np.concatenate(known))]
 
 
 def _record(design: Mesh, settings: FabricationSettings, some: Sequence[Json]) -> Json:

@@ -11,7 +11,7 @@ import numpy as np
 from gso.components import split
 from gso.errors import MeshError
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys
+from gso.mesh.topology import pair_keys
 from gso.pattern import Folded, Pattern, Zone
 from gso.result import Result
 from gso.typing import Array, Ints, Json
@@ -115,11 +115,7 @@ def _rims(panels: list[Panel], pattern: Pattern, label: Ints, local: Ints) -> li
         rim = np.concatenate(
             [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in panel.surface.boundary_loops]
         )
-        own = _keys(local[ends[label[ends[:, 0]] == number]], n)
-        keys = _keys(rim, n)
+        own = pair_keys(local[ends[label[ends[:, 0]] == number]], n)
+        keys = pair_keys(rim, n)
         out.append(rim[~np.isin(keys, own)])
     return out
-
-
-def _keys(edges: Ints, count: int) -> Ints:
-    return edge_keys(edges[:, 0], edges[:, 1], count)

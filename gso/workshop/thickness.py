@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
-from gso.mesh.topology import label_components
+from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.pattern import Zone
 from gso.quantities import as_positive
 from gso.spelling import choices
@@ -234,8 +234,7 @@ def _plates(panel: Panel) -> tuple[Ints, Ints, Ints]:
     """
     he, n = panel.surface.half_edges, len(panel.flat)
     k = he.interior
-    keys = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1) @ np.array([n, 1])
-    wanted = np.sort(panel.bends, axis=1) @ np.array([n, 1])
+    keys, wanted = edge_keys(he.origin[k], he.dest[k], n), pair_keys(panel.bends, n)
     order = np.argsort(keys)
     bent = k[order[np.searchsorted(keys[order], wanted)]]
     keep = k[~np.isin(k, bent)]

@@ -17,6 +17,7 @@ from gso.mesh.topology.half_edges import (
     edges,
     half_edges,
     orient,
+    pair_keys,
     reverse,
     tree_parity,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "hinges",
     "label_components",
     "orient",
+    "pair_keys",
     "polyline_crosses",
     "polyline_triples",
     "quad_splits",

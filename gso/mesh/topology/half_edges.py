@@ -69,6 +69,11 @@ def edge_keys(origin: Ints, dest: Ints, vertex_count: int) -> Ints:
     return np.asarray(np.minimum(origin, dest) * np.int64(vertex_count) + np.maximum(origin, dest))
 
 
+def pair_keys(edges: Ints, vertex_count: int) -> Ints:
+    """Encode undirected edges (e, 2) as integers, as :func:`edge_keys` does."""
+    return edge_keys(edges[:, 0], edges[:, 1], vertex_count)
+
+
 def half_edges(faces: Ints, vertex_count: int) -> HalfEdges:
     """Build the half-edge structure of consistently oriented manifold faces."""
     origin, dest, face, nxt = _half_edge_table(faces)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.errors import MeshError
-from gso.mesh.topology.half_edges import HalfEdges, edge_keys, tree_parity
+from gso.mesh.topology.half_edges import HalfEdges, edge_keys, pair_keys, tree_parity
 from gso.typing import Flags, Ints
 
 
@@ -97,7 +97,7 @@ def _place_in_face(he: HalfEdges, quad: Flags) -> Ints:
 def _clashing_splits(quads: Ints, turn: Flags, he: HalfEdges) -> Flags:
     """Mark the quads whose diagonal is also an edge or the diagonal of another quad."""
     ends = np.where(turn[:, None], quads[:, [1, 3]], quads[:, [0, 2]])
-    split = edge_keys(ends[:, 0], ends[:, 1], he.vertex_count)
+    split = pair_keys(ends, he.vertex_count)
     _, which, often = np.unique(split, return_inverse=True, return_counts=True)
     return (often[which] > 1) | np.isin(split, edge_keys(he.origin, he.dest, he.vertex_count))
 

@@ -135,7 +135,7 @@ def _edges(rings: list[Ints], rulings: Ints) -> tuple[Ints, Ints]:
     i = np.flatnonzero(key[order][1:] == key[order][:-1])
     one, two = order[i], order[i + 1]
     inner = np.stack([owner[one], owner[two], a[one], b[one]], axis=1)
-    is_ruling = np.isin(key[one], topology.edge_keys(rulings[:, 0], rulings[:, 1], count))
+    is_ruling = np.isin(key[one], topology.pair_keys(rulings, count))
     return inner[is_ruling], inner[~is_ruling]
 
 
