@@ -38,8 +38,8 @@ def solve_and_judge(run: Run) -> Result:
     """Solve the case of a run; again, within a distance, where the result is not usable.
 
     Where the user gave limits, the task searches for a result that holds them. Where there are
-    none, a result that strains too much, is too far away or folds is solved again with a bound on
-    the distance, by the same formulation and, where the user did not name it, by others. The first
+    none, a result that strains too much, is too far away or folds is solved again, kept near the
+    design, by the same formulation and, where the user did not name it, by others. The first
     usable result is returned, or else the one that misses its limits by the smallest factor
     (:func:`excess`). Where the formulation improves the result of another one, that one is solved
     for in the same way, and returned where it is better (:func:`_is_worse`). A callback ends all
@@ -86,7 +86,7 @@ class _Solves:
             return first
         why = str(first.reasons[0]).partition(";")[0]
         note = (
-            f"this is another solve, by {best.formulation!r}, with a bound on the distance; "
+            f"this is another solve, by {best.formulation!r}, that is kept near the design; "
             f"of the first one {why}"
         )
         return replace(best, notes=(*best.notes, note))
