@@ -578,7 +578,7 @@ def test_bad_input_is_refused():
 def test_parts_of_the_workshop_lose_no_fold_and_no_area(model):
     net = made(*model)
     finish = Finish(notches=None)
-    parts = parts_from(fitted(of_net("it", net), 10.0, finish), finish)
+    parts, _ = parts_from(fitted(of_net("it", net), 10.0, finish), finish)
     assert len(parts) == len(net)
     p = net.mesh.vertices[net.mesh.faces]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])

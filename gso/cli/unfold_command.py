@@ -117,20 +117,22 @@ def unfold(
             net = made(None)
             click.echo(f"note: {error}; its part is on several pages", err=True)
     options = {} if paper is None else {"paper": paper}
-    writers.write(drawn(net, Path(name).stem, unit, finish), out, **options)
+    drawing, bare = drawn(net, Path(name).stem, unit, finish)
+    writers.write(drawing, out, **options)
     if not quiet:
-        click.echo("\n".join(text(net, unit)))
+        click.echo("\n".join([*text(net, unit), *(f"note: {note}" for note in bare)]))
 
 
-def drawn(net: Net, name: str, unit: str, finish: Finish) -> Drawing:
-    """Return the parts of a net side by side, in millimetres."""
+def drawn(net: Net, name: str, unit: str, finish: Finish) -> tuple[Drawing, list[str]]:
+    """Return the parts of a net side by side, in millimetres, and notes on them."""
     from gso.quantities import millimetres
-    from gso.workshop import fitted, of_net, parts_from
+    from gso.workshop import fitted, of_net, parts_from, without_tabs
     from gso.workshop.names import spelled
     from gso.workshop.output_files import beside
 
     made = of_net(spelled(name), net)
-    return beside(parts_from(fitted(made, millimetres(unit), finish), finish))
+    parts, bare = parts_from(fitted(made, millimetres(unit), finish), finish)
+    return beside(parts), without_tabs(bare)
 
 
 def text(net: Net, unit: str) -> list[str]:

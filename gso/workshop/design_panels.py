@@ -165,7 +165,8 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "strain_p99": found.strain,
         "thickness": thick,
     }
-    one = of_surface(given.name, found.surface, found.pattern, record, found.bends, found.zones)
+    drawn = (found.bends, found.zones, found.seam_angles)
+    one = of_surface(given.name, found.surface, found.pattern, record, *drawn)
     one = replace(one, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
 

@@ -122,6 +122,9 @@ class Mating:
         The same points on both sides.
     common : bool
         Whether both sides are one curve in space; else they follow it within a distance.
+    angle : float
+        Angle between the faces on both sides in radians, positive for mountain folds, 0 where the
+        surface is smooth; infinite where it changes along the seam, and NaN where it is not known.
     """
 
     number: int
@@ -129,6 +132,7 @@ class Mating:
     one: Side
     two: Side
     common: bool = True
+    angle: float = np.nan
 
     @property
     def length(self) -> float:
@@ -184,6 +188,7 @@ class Made:
             out[f"seam{k}_along"] = seam.along
             out[f"seam{k}_number"] = np.array(seam.number)
             out[f"seam{k}_common"] = np.array(int(seam.common))
+            out[f"seam{k}_angle"] = np.array(seam.angle)
             for name, side in (("one", seam.one), ("two", seam.two)):
                 out[f"seam{k}_{name}_edges"] = side.edges
                 out[f"seam{k}_{name}_shares"] = side.shares
@@ -220,7 +225,8 @@ class Made:
                     for side in ("one", "two")
                 )
                 number, common = int(data[f"seam{k}_number"]), bool(data[f"seam{k}_common"])
-                matings.append(Mating(number, data[f"seam{k}_along"], one, two, common))
+                angle = float(data[f"seam{k}_angle"])
+                matings.append(Mating(number, data[f"seam{k}_along"], one, two, common, angle))
         except (KeyError, ValueError, TypeError) as error:
             raise MeshError(f"the arrays of {name} do not fit each other: {error}") from None
         return cls(name, tuple(panels), tuple(matings), record)

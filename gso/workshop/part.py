@@ -79,8 +79,8 @@ class Part:
     marks : tuple of ndarray, (k, 2)
         Lines to engrave.
     seams : tuple of ndarray, (k, 2)
-        Lines to sew, glue or weld along, inside an allowance; closed if the first point is
-        repeated.
+        Lines to sew, glue or weld along, inside an allowance or an overlap; closed if the first
+        point is repeated.
     notches : tuple of Notch
     labels : tuple of Label
     grain : ndarray, (2,), or None
@@ -141,6 +141,7 @@ class Part:
             holes=tuple(hole[::-1] for hole in over.holes),
             seams=tuple(line[::-1] for line in over.seams),
             bends=tuple(bend._replace(angle=-bend.angle) for bend in over.bends),
+            zones=tuple(zone._replace(angle=-zone.angle) for zone in over.zones),
         )
 
     def _mapped(self, turn: Array, shift: Array, spin: Callable[[float], float]) -> Part:

@@ -34,6 +34,7 @@ def of_surface(
     record: Json,
     folded: Folded = _NO_FOLDS,
     zones: Sequence[Zone] = (),
+    angles: Array | None = None,
 ) -> Made:
     """Divide a surface with a pattern into panels.
 
@@ -49,11 +50,13 @@ def of_surface(
         Bend lines: rulings of round faces, and folds.
     zones : sequence of Zone, optional
         Round faces, by the numbers that bend lines have.
+    angles : ndarray, (s,), optional
+        Angle between the faces at each seam edge.
     """
     panels, label, local = _divided(surface.vertices, pattern, folded)
     panels = [_with_zones(panel, zones) for panel in panels]
     corners = len(folded.edges) > 0
-    matings = of_pattern(surface.vertices, pattern, label, local, corners)
+    matings = of_pattern(surface.vertices, pattern, label, local, corners, angles)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 
 
