@@ -78,7 +78,6 @@ def unfold(
     """
     import numpy as np
 
-    from gso.mesh import Mesh
     from gso.seams import Labels
     from gso.unfolding import unfold as make
     from gso.workshop import Finish, writers
@@ -90,9 +89,9 @@ def unfold(
     file_options.spare([name], [out], force)
     finish = Finish(notches=None, tabs=tabs, numbers=numbers)
     edges = np.array(cut, np.int64).reshape(-1, 2)
-    mesh = file_options.load(name, weld) if keep_groups else file_options.source(name, weld)
-    if isinstance(mesh, Mesh):
-        edges = np.concatenate([edges, Labels("g").edges(mesh)])
+    mesh = file_options.source(name, weld)
+    if keep_groups:
+        edges = np.concatenate([edges, Labels("g").edges(file_options.load(name, weld))])
     factor = file_options.scale_of([mesh], scale, height, up, unit)
 
     def made(sheet: tuple[float, float] | None) -> Net:
