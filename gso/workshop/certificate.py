@@ -114,6 +114,7 @@ def part_record(panel: Panel, part: Part) -> Json:
             }
             for zone in part.zones
         ],
+        "faces": list(part.faces),
         "notches": len(part.notches),
         "chord": chord(part.outline),
     }

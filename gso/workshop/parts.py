@@ -166,6 +166,7 @@ def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
         drawn(panel.lines),
         marks=tuple(marks),
         zones=panel.zones,
+        faces=panel.faces,
     )
 
 
@@ -321,8 +322,16 @@ def _registered(
 
 
 def _name(part: Part, height: float) -> tuple[Label, ...]:
-    """Place the name where there is most room, no larger than fits."""
+    """Place the name where there is most room, no larger than fits; below it what it is made of."""
     middle, room = roomiest(region(part.outline, part.holes))
-    # A letter is about 0.7 of its height wide.
-    fits = 2.0 * room / max(0.7 * len(part.name), 1.0)
-    return (Label(part.name, middle, min(height, fits)),) if room > 0 else ()
+
+    def label(text: str, below: float, most: float) -> Label:
+        # A letter is about 0.7 of its height wide.
+        high = min(most, 2.0 * room / max(0.7 * len(text), 1.0))
+        return Label(text, middle - [0.0, below], high)
+
+    if not room > 0:
+        return ()
+    name = label(part.name, 0.0, height)
+    said = (label(part.made_of, name.height, 0.5 * name.height),) if part.faces else ()
+    return (name, *said)
