@@ -160,7 +160,8 @@ def test_quads_that_become_triangles_keep_their_other_corners():
         (("vt 0.0 0.0", "vt x 0"), "the texture coordinates .vt. were left out: line"),
         (("vt 0.0 0.0", "vt"), "one to three numbers"),
         (("/25", "/99"), "refers to texture coordinates 99, but the file has 25"),
-        (("s 1", "s 1\nvn 0 0 1\nl 1 2"), r"left out: 1 normals \(vn\), 1 polylines \(l\)"),
+        (("s 1", "s 1\nvn 0 0 1\nl 1 2"), r"left out: 1 normals \(vn\)$"),
+        (("s 1", "s 1\nl 1 2"), r"1 polylines \(l\): gso unfold and gso fabricate"),
     ],
 )
 def test_what_cannot_be_kept_is_said(change, words, tmp_path):

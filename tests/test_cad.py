@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
+import ezdxf
 import numpy as np
 import pytest
 from scipy.special import ellipe
 
 import gso
-from gso import io, recognition
+from gso import Mesh, io, recognition
+from gso.mesh import Labels
 from gso.workshop import Finish
 
 pytest.importorskip("OCP", exc_type=ImportError)
@@ -304,6 +307,11 @@ class TestSheetMetal:
         assert abs(bend.angle) == pytest.approx(angle, abs=1e-9)
         assert bend.radius == pytest.approx(INNER, abs=1e-6)
         assert done.certificate["designs"][0]["thickness"] == pytest.approx(THICK)
+        faces = done.certificate["designs"][0]["parts"][0]["faces"]
+        kinds = [re.fullmatch(r"face \d+ \((\w+)\)", name)[1] for name in faces]
+        assert sorted(kinds) == ["cylinder", "plane", "plane"]
+        page = (tmp_path / "a" / "index.html").read_text()
+        assert f"made of {', '.join(faces)}" in page
 
     def test_a_bend_table_gives_the_deduction(self, tmp_path):
         done = made(saved(bracket(), tmp_path / "a.step"), bend_table=[[np.pi / 2, 4.1]])
@@ -324,6 +332,22 @@ class TestSheetMetal:
         )
         (part,) = made(saved(tube, tmp_path / "a.step"), k_factor=0.5).parts
         np.testing.assert_allclose(part.size, [2 * np.pi * 19, 100], atol=1e-3)
+
+    def test_parts_name_the_faces_that_they_are_made_of(self, tmp_path):
+        mesh = gso.load(saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step"))
+        said = mesh.attributes
+        first = np.unique(said.surfaces.of_face, return_index=True)[1]
+        names = ("lid", "", "", "front", "", "")
+        labels = {"g": Labels(names, said.surfaces.of_face)}
+        named = Mesh(mesh.vertices, mesh.faces, attributes=replace(said, labels=labels))
+        edge = mesh.edges[np.ptp(mesh.vertices[mesh.edges], axis=1).astype(bool).sum(axis=1) == 1]
+        done = gso.fabricate(named, tmp_path / "b", cut=edge, workers=0, formats=("dxf",))
+        assert len(done.parts) == len(first) == 6
+        found = sorted(part.faces for part in done.parts)
+        assert found == sorted((name or f"face {k} (plane)",) for k, name in enumerate(names))
+        for part in done.parts:
+            drawn = ezdxf.readfile(tmp_path / "b" / "parts" / f"{part.name}.dxf").modelspace()
+            assert part.faces[0] in [text.dxf.text for text in drawn.query("TEXT")]
 
     def test_a_box_that_is_no_sheet_becomes_a_net(self, tmp_path):
         done = made(saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step"))

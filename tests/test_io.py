@@ -152,7 +152,8 @@ def test_obj_as_other_programs_write_it(tmp_path):
     ]  # fmt: skip
     assert mesh.notes == (
         "1 polygons with more than four corners were cut into triangles (the first is face 3)",
-        "left out: 1 normals (vn), 1 polylines (l), colours of vertices",
+        "left out: 1 normals (vn), colours of vertices",
+        "1 polylines (l): gso unfold and gso fabricate cut along them",
     )
     said = mesh.attributes
     assert said.libraries == ("x.mtl",)

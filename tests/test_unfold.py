@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import time
 
 import numpy as np
@@ -578,7 +579,7 @@ def test_bad_input_is_refused():
 def test_parts_of_the_workshop_lose_no_fold_and_no_area(model):
     net = made(*model)
     finish = Finish(notches=None)
-    parts = parts_from(fitted(of_net("it", net), 10.0, finish), finish)
+    parts, _ = parts_from(fitted(of_net("it", net), 10.0, finish), finish)
     assert len(parts) == len(net)
     p = net.mesh.vertices[net.mesh.faces]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -623,3 +624,46 @@ def test_command_names_wrong_options(tmp_path):
     run = CliRunner().invoke
     assert "such as 0-7" in run(main, ["unfold", name, "-o", "x.svg", "--cut", "a"]).output
     assert "no writer for '.dwg'" in run(main, ["unfold", name, "-o", "x.dwg"]).output
+
+
+def test_polylines_of_the_file_are_cut(tmp_path):
+    # A square tube of four sides, each of two quads, on top of each other.
+    ring = [(0, 0), (60, 0), (60, 40), (0, 40)]
+    points = [(*p, z) for z in (0, 30, 70) for p in ring]
+    sides = [
+        (4 * r + k + 1, 4 * r + (k + 1) % 4 + 1, 4 * r + (k + 1) % 4 + 5, 4 * r + k + 5)
+        for r in (0, 1)
+        for k in range(4)
+    ]
+    body = [f"v {x} {y} {z}" for x, y, z in points]
+    body += [f"f {' '.join(map(str, side))}" for side in sides]
+    path = tmp_path / "tube.obj"
+
+    def cuts(*lines):
+        path.write_text("\n".join([*body, *lines, ""]))
+        net = gso.unfold(path)
+        assert len(net) == 1
+        points, seams = net.pattern.vertex, net.pattern.seams
+        ends = np.asarray(net.mesh.vertices)[points[seams[:, 0]]]
+        assert (ends[..., 2].min(axis=1) < ends[..., 2].max(axis=1)).all()
+        return {tuple(end[0, :2]) for end in ends}, net.notes
+
+    for k, at in enumerate(ring, start=1):
+        # Along two edges at once, edge by edge, and by vertices of its own.
+        assert cuts(f"l {k} {k + 8}")[0] == {at}
+        assert cuts(f"l {k} {k + 4} {k + 8}")[0] == {at}
+        x, y = at
+        assert cuts(f"v {x} {y} 0", f"v {x} {y} 70", "l -1 -2")[0] == {at}
+    places, notes = cuts("l 1 5 9", "l 1 6")
+    assert places == {ring[0]}
+    assert any(re.search(r"polyline 2 .* between \(0, 0, 0\) and \(60, 0, 30\)", n) for n in notes)
+    # The same by gso fabricate: the seam is where the line is.
+    job = gso.fabricate(path, tmp_path / "job", formats=("svg",), workers=0)
+    assert job.usable and sum("polyline 2" in note for note in job.certificate["notes"]) == 1
+    np.testing.assert_allclose(sorted(job.parts[0].size), [70.0, 200.0])
+    (surface,) = (gso.load(p) for p in (tmp_path / "job" / "surfaces").glob("*.obj"))
+    twice = [p for p in surface.vertices.tolist() if surface.vertices.tolist().count(p) == 2]
+    assert {tuple(p[:2]) for p in twice} == {ring[0]}
+    path.write_text("\n".join([*body, "l 1 99", ""]))
+    with pytest.raises(gso.MeshError, match="refers to vertex 99"):
+        gso.unfold(path)

@@ -53,7 +53,7 @@ def parts_of(whole, scale, finish, marks=(), holes=()):
     own = fitted(whole, scale, finish, marks, holes)
     if own.reasons:
         raise OptionError("; ".join(map(str, own.reasons)))
-    return parts_from(own, finish)
+    return parts_from(own, finish)[0]
 
 
 def to_surface(panel, points):

@@ -89,6 +89,8 @@ if TYPE_CHECKING:
     "their distance from the seam.",
 )
 @shared.tabs
+@shared.seam_overlap
+@shared.seam_flange
 @shared.numbers
 @click.option("--labels", metavar="MM", default=6.0, help="Height of the names on parts.")
 @click.option("--no-labels", is_flag=True, help="No names on parts.")
@@ -174,6 +176,7 @@ def fabricate(
 
     finish = Finish(
         **taken("kerf", "allowance", "notches", "tabs", "numbers", "labels", "grain"),
+        **taken("seam_overlap", "seam_flange"),
         registration=given.pop("holes"),
         face="inside" if given.pop("inside_up") else "outside",
         **_thickness(**taken("thickness", "k_factor", "face", "bend_radius", "bend_table")),

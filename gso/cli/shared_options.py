@@ -141,6 +141,18 @@ up = click.option(
 tabs = click.option(
     "--tabs", metavar="MM", type=float, help="Width of tabs along seams, for paper."
 )
+seam_overlap = click.option(
+    "--seam-overlap",
+    metavar="MM",
+    type=MM,
+    help="Width by which parts overlap along smooth seams, to be glued, riveted or welded.",
+)
+seam_flange = click.option(
+    "--seam-flange",
+    metavar="MM",
+    type=MM,
+    help="Width of flanges along seams with an angle, folded by it.",
+)
 numbers = click.option(
     "--numbers",
     type=click.Choice(("inside", "outside")),

@@ -78,7 +78,6 @@ def unfold(
     """
     import numpy as np
 
-    from gso.mesh import Mesh
     from gso.seams import Labels
     from gso.unfolding import unfold as make
     from gso.workshop import Finish, writers
@@ -90,9 +89,9 @@ def unfold(
     file_options.spare([name], [out], force)
     finish = Finish(notches=None, tabs=tabs, numbers=numbers)
     edges = np.array(cut, np.int64).reshape(-1, 2)
-    mesh = file_options.load(name, weld) if keep_groups else file_options.source(name, weld)
-    if isinstance(mesh, Mesh):
-        edges = np.concatenate([edges, Labels("g").edges(mesh)])
+    mesh = file_options.source(name, weld)
+    if keep_groups:
+        edges = np.concatenate([edges, Labels("g").edges(file_options.load(name, weld))])
     factor = file_options.scale_of([mesh], scale, height, up, unit)
 
     def made(sheet: tuple[float, float] | None) -> Net:
@@ -117,20 +116,22 @@ def unfold(
             net = made(None)
             click.echo(f"note: {error}; its part is on several pages", err=True)
     options = {} if paper is None else {"paper": paper}
-    writers.write(drawn(net, Path(name).stem, unit, finish), out, **options)
+    drawing, bare = drawn(net, Path(name).stem, unit, finish)
+    writers.write(drawing, out, **options)
     if not quiet:
-        click.echo("\n".join(text(net, unit)))
+        click.echo("\n".join([*text(net, unit), *(f"note: {note}" for note in bare)]))
 
 
-def drawn(net: Net, name: str, unit: str, finish: Finish) -> Drawing:
-    """Return the parts of a net side by side, in millimetres."""
+def drawn(net: Net, name: str, unit: str, finish: Finish) -> tuple[Drawing, list[str]]:
+    """Return the parts of a net side by side, in millimetres, and notes on them."""
     from gso.quantities import millimetres
-    from gso.workshop import fitted, of_net, parts_from
+    from gso.workshop import fitted, of_net, parts_from, without_tabs
     from gso.workshop.names import spelled
     from gso.workshop.output_files import beside
 
     made = of_net(spelled(name), net)
-    return beside(parts_from(fitted(made, millimetres(unit), finish), finish))
+    parts, bare = parts_from(fitted(made, millimetres(unit), finish), finish)
+    return beside(parts), without_tabs(bare)
 
 
 def text(net: Net, unit: str) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.exact.fold_edges import FOLD, fold_edges
+from gso.exact.fold_edges import FOLD, fold_edges, seam_angles
 from gso.exact.low_poly import facets, is_low_poly
 from gso.exact.rolled_faces import fold
 from gso.exact.ruled_bends import joined_bends, ruled_bends, zones_of
@@ -50,6 +50,9 @@ class FoldedPattern:
         Largest strain of a face that has no equation.
     face : ndarray of int, (t,)
         The face in `recognised` of each triangle.
+    seam_angles : ndarray, (s,)
+        Angle between the faces at each seam edge of the pattern, as of a bend; 0 where the surface
+        is smooth.
     """
 
     surface: Mesh
@@ -60,6 +63,7 @@ class FoldedPattern:
     parts: int
     strain: float
     face: Ints
+    seam_angles: Array
 
     @property
     def bends(self) -> Folded:
@@ -170,6 +174,7 @@ def folded_pattern(
         int(joined.part.max()) + 1,
         max(face.strain for face in shape.faces),
         sliced.label,
+        seam_angles(sliced, shape),
     )
 
 

@@ -39,7 +39,7 @@ from gso.io.raw_surface import Surface, welded
 from gso.io.raw_surface import checked as checked_weld
 from gso.io.source import read_bytes
 from gso.mesh import Mesh
-from gso.typing import AnyPath, MeshLike, Unwelded
+from gso.typing import AnyPath, Array, MeshLike, Unwelded
 
 __all__ = [
     "SPLINE_SUFFIXES",
@@ -157,6 +157,22 @@ def read_surface(path: AnyPath) -> Surface:
         The file is missing, of an unknown format or damaged.
     """
     return _read(path, lambda surface: surface)
+
+
+def polylines(path: AnyPath) -> list[Array]:
+    """Read the points (k, 3) of each polyline (``l``) in an OBJ file; none from other files.
+
+    Raises
+    ------
+    MeshError
+        The file is missing or damaged.
+    """
+    if suffix_of(path) != ".obj":
+        return []
+    try:
+        return obj.polylines(read_bytes(path))
+    except MeshError as error:
+        raise MeshError(f"{os.fsdecode(path)}: {error}") from None
 
 
 def _read(path: AnyPath, made: Callable[[Surface], _Made], chord: float | None = None) -> _Made:

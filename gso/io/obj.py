@@ -18,7 +18,6 @@ from gso.typing import Array, Ints
 _LEFT_OUT = {
     b"vn": "normals",
     b"vp": "points of curves",
-    b"l": "polylines",
     b"p": "points",
     b"curv": "curves",
     b"surf": "surfaces",
@@ -36,7 +35,8 @@ def read(data: bytes) -> Surface:
       ones count back from the last element before the line.
     - ``vt``, ``mtllib``, and the face names of ``o``, ``g``, ``s`` and ``usemtl``.
 
-    Notes list normals, curves and other known content that is left out.
+    Notes list normals, curves and other known content that is left out; :func:`polylines` reads
+    the polylines.
     """
     words = Words(data, comment=b"#", joined=True)
     v, f = words.rows(b"v"), words.rows(b"f")
@@ -159,7 +159,27 @@ def _left_out(words: Words, v: Ints) -> tuple[str, ...]:
     ]
     if (words.count[v] > 5).any():
         parts.append("colours of vertices")
-    return (f"left out: {', '.join(parts)}",) if parts else ()
+    out = (f"left out: {', '.join(parts)}",) if parts else ()
+    lines = words.rows(b"l").size
+    said = f"{lines} polylines (l): gso unfold and gso fabricate cut along them"
+    return (*out, said) if lines else out
+
+
+def polylines(data: bytes) -> list[Array]:
+    """Return the points (k, 3) of each polyline (``l``) in an OBJ file."""
+    words = Words(data, comment=b"#", joined=True)
+    v, rows = words.rows(b"v"), words.rows(b"l")
+    if not (rows.size and v.size):
+        return []
+    count = words.count[rows] - 1
+    corner = ranges(words.first[rows] + 1, count)
+    number = words.ints(corner, until=b"/")
+    index = _from_front(number, v, rows, count)
+    outside = (index < 0) | (index >= v.size)
+    if outside.any():
+        at = int(outside.argmax())
+        words.fail(corner[at], f"a polyline refers to vertex {number[at]}, which is not there")
+    return np.split(_vertices(words, v)[index], np.cumsum(count)[:-1])
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:

@@ -37,6 +37,13 @@ class PlanarFaces:
     face: Ints
     vertex: Ints
 
+    @property
+    def edges(self) -> Ints:
+        """Half-edges (e, 2) of the polygons: not the diagonals along which they are divided."""
+        he = self.mesh.half_edges
+        own = (he.twin < 0) | (self.face[he.face] != self.face[he.face[he.twin]])
+        return np.stack([he.origin[own], he.dest[own]], axis=1)
+
     @classmethod
     def of(
         cls, points: Array, polygons: Sequence[Sequence[int]], notes: tuple[str, ...] = ()

@@ -18,7 +18,8 @@ from gso.mesh.topology import label_components
 from gso.mesh.validation import checked_vertices
 from gso.pattern import Folded, Pattern
 from gso.quantities import Length, as_positive, as_sheet
-from gso.typing import Array, Ints, MeshLike
+from gso.typing import Array, Ints, MeshLike, Unwelded
+from gso.unfolding.edge_lines import edges_along
 from gso.unfolding.manifold import edges_between
 from gso.unfolding.patch_joining import Joined, join_patches
 from gso.unfolding.planar_faces import PlanarFaces
@@ -62,7 +63,7 @@ def unfold(
         divided, and `notes` says so.
     keep, cut : array_like of int, (k, 2), optional
         Edges, by their vertices, that are not cut in any case, and that are. One edge that is cut
-        inside a part opens nothing.
+        inside a part opens nothing. Edges along the polylines (``l``) of an OBJ file are cut, too.
     sheet : (float, float), optional
         Length and width of a sheet that every part must fit on, in millimetres, or texts such as
         "3m".
@@ -106,6 +107,7 @@ def unfold(
         raise OptionError(f"seed is {seed!r}; it must be a whole number of 0 or more")
     as_positive(scale, "scale")
     faces = _faces(mesh)
+    drawn, notes = edges_along(faces.mesh.vertices, faces.edges, polylines_of(mesh))
     if scale != 1.0:
         faces = replace(faces, mesh=faces.mesh.replaced(scale * faces.mesh.vertices))
     size = as_sheet(sheet, unit)
@@ -113,13 +115,19 @@ def unfold(
         faces.mesh.vertices,
         faces.mesh.triangles,
         keep=edges_between(faces.mesh, faces.vertex, keep, "keep"),
-        cut=edges_between(faces.mesh, faces.vertex, cut, "cut"),
+        cut=np.concatenate([edges_between(faces.mesh, faces.vertex, cut, "cut"), drawn]),
         sheet=size,
         flat_angle=flat_angle,
         seed=int(seed),
         effort=effort,
     )
-    return net_of(faces, joined, flat_angle)
+    return net_of(faces, joined, flat_angle, tuple(notes))
+
+
+def polylines_of(given: object) -> list[Array]:
+    """Return the polylines (k, 3) of a surface that is read from an OBJ file."""
+    source = given.surface if isinstance(given, Unwelded) else given
+    return io.polylines(source) if isinstance(source, str | os.PathLike) else []
 
 
 def _faces(given: Polygons) -> PlanarFaces:
@@ -158,7 +166,9 @@ def _rows(polygons: object) -> list[list[int]]:
     return [row[:-1] if row and row[-1] == -1 else row for row in rows]
 
 
-def net_of(faces: PlanarFaces, joined: Joined, flat_angle: float) -> Net:
+def net_of(
+    faces: PlanarFaces, joined: Joined, flat_angle: float, notes: tuple[str, ...] = ()
+) -> Net:
     """Make the net of faces from the parts that they were joined to."""
     triangles, edges = faces.mesh.triangles, joined.edges
     one, other = edges.corners()
@@ -173,7 +183,7 @@ def net_of(faces: PlanarFaces, joined: Joined, flat_angle: float) -> Net:
     pattern = Pattern(flat, corner.reshape(-1, 3), triangles.ravel()[first], seams)
     bent = whole & (np.abs(edges.angles) > _LEVEL)
     folded = Folded(corner[one[bent]], edges.angles[bent], np.zeros(int(bent.sum())))
-    notes = faces.mesh.notes
+    notes = (*faces.mesh.notes, *notes)
     if opened := int((~whole & (np.abs(edges.angles) <= np.radians(flat_angle))).sum()):
         notes += (f"{opened} edges in flat faces were cut, as asked for or to save parts",)
     return Net(

@@ -256,6 +256,13 @@ class Code(str, enum.Enum):
         "the sides of a seam differ by {value} in a sheet of this thickness, more than {bound}",
         "take --face middle, or a thinner sheet",
     )
+    SEAM_STRIP = _fault(
+        "seam_strip",
+        "Seams that cannot have the overlap or flange asked for: it would meet its part, be wider "
+        "than the face beside it or be folded along a curve, or the design is changed.",
+        "no overlap or flange of this width is possible on either side of seams",
+        "take a narrower one (--seam-overlap, --seam-flange), or cut the design elsewhere",
+    )
     HOLE_ACROSS_SEAM = _fault(
         "hole_across_seam",
         "Holes that lie on several parts.",

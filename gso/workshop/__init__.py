@@ -16,7 +16,7 @@ from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.pattern_panels import of_net
-from gso.workshop.tabs import TabSeam, with_tabs
+from gso.workshop.tabs import TabSeam, with_tabs, without_tabs
 from gso.workshop.thickness import Thickness, thickened
 
 __all__ = [
@@ -39,4 +39,5 @@ __all__ = [
     "parts_from",
     "thickened",
     "with_tabs",
+    "without_tabs",
 ]

@@ -112,8 +112,9 @@ def part_record(panel: Panel, part: Part) -> Json:
                 "angle": float(np.degrees(zone.angle)),
                 "text": zone.in_words(),
             }
-            for zone in panel.zones
+            for zone in part.zones
         ],
+        "faces": list(part.faces),
         "notches": len(part.notches),
         "chord": chord(part.outline),
     }

@@ -13,6 +13,7 @@ from gso.exact import folded_pattern
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
+from gso.recognition import Recognised
 from gso.verdict import compare, crosses_itself
 from gso.verdict.surface_checks import crossed
 from gso.workshop import measurements
@@ -165,9 +166,26 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
         "strain_p99": found.strain,
         "thickness": thick,
     }
-    one = of_surface(given.name, found.surface, found.pattern, record, found.bends, found.zones)
+    made_of = (found.face, _cad_faces(given.mesh, found.recognised))
+    drawn = (found.bends, found.zones, found.seam_angles, made_of)
+    one = of_surface(given.name, found.surface, found.pattern, record, *drawn)
     one = replace(one, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
+
+
+def _cad_faces(mesh: Mesh, shape: Recognised) -> list[tuple[str, ...]]:
+    """Return the names in a CAD file of what each face consists of: the given ones if there are."""
+    said = mesh.attributes
+    if said is None or said.surfaces is None:
+        return [()] * len(shape.faces)
+    given, labels = said.surfaces.of_face, said.labels.get("g")
+    names = [surface.name for surface in said.surfaces.surfaces]
+    if labels is not None:
+        for number, first in zip(*np.unique(given, return_index=True), strict=True):
+            label = int(labels.of_face[first])
+            names[number] = (labels.names[label] if label >= 0 else "") or names[number]
+    own = (np.unique(given[shape.source[face.triangles]]).tolist() for face in shape.faces)
+    return [tuple(names[k] for k in numbers) for numbers in own]
 
 
 def _press_radius(given: Design, settings: FabricationSettings) -> tuple[float, float] | None:

@@ -17,7 +17,9 @@ from gso.mesh import Mesh
 from gso.seams.kinds import Groups
 from gso.sheet_metal import sheet_solid
 from gso.typing import Ints, MeshLike
+from gso.unfolding.edge_lines import edges_along
 from gso.unfolding.manifold import edges_between, manifold_mesh
+from gso.unfolding.unfold_mesh import polylines_of
 from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.job_folder import path_of
 from gso.workshop.names import different, spelled
@@ -87,16 +89,16 @@ def designs_of(
         stem = f"design{suffix}" if path is None else path.stem
         mesh, vertex = manifold_mesh(one)
         mesh.check_joined()
+        drawn, leaves = edges_along(mesh.vertices, mesh.edges, polylines_of(one))
         if scale != 1.0:
             mesh = mesh.replaced(scale * mesh.vertices)
         kept, uncut = (
             edges_between(mesh, vertex, pairs, name)
             for pairs, name in ((cut, "cut"), (keep, "keep"))
         )
-        if keep_groups:
-            kept = np.concatenate([kept, Groups().edges(mesh)])
+        kept = np.concatenate([kept, drawn, *([Groups().edges(mesh)] if keep_groups else [])])
         components = split(mesh)
-        notes = tuple(f"{stem}: {note}" for note in mesh.notes)
+        notes = tuple(f"{stem}: {note}" for note in (*mesh.notes, *leaves))
         met = np.zeros(len(mesh.faces), bool)
         if len(components) > 1:
             pairs = crossings(mesh)

@@ -25,7 +25,7 @@ from gso.quantities import (
     millimetres,
 )
 from gso.typing import AnyPath, Array, Json
-from gso.verdict import Code, Reason, failure, merge, ordered
+from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
@@ -40,7 +40,9 @@ from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.seam_strips import SMOOTH
 from gso.workshop.solids import folded_solids
+from gso.workshop.tabs import without_tabs
 from gso.workshop.work import made_all
 from gso.workshop.writers.pdf import room
 
@@ -286,13 +288,19 @@ def fabricate(
         fit = fitted(one, per_unit, asked, *lines)
         if step and asked.thickness is not None:
             solids += folded_solids(one.panels, per_unit, asked.thickness)
-        own = [replace(part, count=len(copies)) for part in parts_from(fit, asked)]
+        cut_out, bare = parts_from(fit, asked)
+        own = [replace(part, count=len(copies)) for part in cut_out]
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
+        said = without_tabs(bare) if asked.tabs else []
         if asked.tabs is not None and one.record["deviation_max"] == 0.0:
-            why, said = _of_paper(why)
-            notes += [f"{one.name}: {note}" for note in said]
+            why, through = _of_paper(why)
+            said += through
+        if asked.seam_strip:
+            why = merge(why, compare({Code.SEAM_STRIP: Measurement.count("seam", bare)}, {}))
+            said += _other_seams(one, asked)
+        notes += [f"{one.name}: {note}" for note in said]
         record["reasons"] = _words(why)
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
@@ -353,6 +361,20 @@ def fabricate(
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
+
+
+def _other_seams(made: Made, finish: Finish) -> list[str]:
+    """Say where no seam is of the kind that strips along seams are asked for."""
+    smooth = [abs(seam.angle) <= SMOOTH for seam in made.matings]
+    kinds = (
+        (finish.seam_overlap, any(smooth), "smooth", "overlap"),
+        (finish.seam_flange, not all(smooth), "at an angle", "flange"),
+    )
+    return [
+        f"no seam is {kind}, so that none has {'an' if what == 'overlap' else 'a'} {what}"
+        for width, found, kind, what in kinds
+        if width and not found
+    ]
 
 
 def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:

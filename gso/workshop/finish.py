@@ -34,6 +34,10 @@ class Finish:
         Diameter of registration holes beside the notches, and their distance from the seam.
     tabs : float or None
         Width of tabs along one side of each seam, for paper.
+    seam_overlap, seam_flange : float or None
+        Width of a strip along one side of each seam of designs that keep their shape: along smooth
+        seams a part overlaps the other one, and along seams with an angle it has a flange, which
+        is folded by that angle. None for none.
     numbers : {"inside", "outside"} or None
         Where the numbers of seams stand: in the parts, or on tabs and outside the outlines. None:
         on tabs and, beside the other side, in the parts, if there are tabs and no notches.
@@ -56,6 +60,8 @@ class Finish:
     notches: float | None = 50.0
     registration: tuple[float, float] | None = None
     tabs: float | None = None
+    seam_overlap: float | None = None
+    seam_flange: float | None = None
     numbers: str | None = None
     labels: float | None = 6.0
     grain: bool = False
@@ -65,7 +71,8 @@ class Finish:
     bend_table: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        for name in ("kerf", "allowance", "notches", "tabs", "labels"):
+        lengths = ("kerf", "allowance", "notches", "tabs", "seam_overlap", "seam_flange", "labels")
+        for name in lengths:
             value = getattr(self, name)
             if value is not None:
                 as_positive(value, name, zero=name in ("kerf", "allowance"))
@@ -85,8 +92,16 @@ class Finish:
         for name, given in (("face", self.face), ("numbers", self.numbers or SIDES[0])):
             if given not in SIDES:
                 raise OptionError(f"no {name} {given!r}; {choices(given, SIDES)}")
-        if self.tabs is not None and self.allowance:
-            raise OptionError("tabs and allowance exclude each other; leave one of them out")
+        if (self.tabs is not None) + (self.allowance > 0) + (self.seam_strip > 0) > 1:
+            raise OptionError(
+                "tabs, allowance, and overlap or flange of seams exclude each other; leave out all "
+                "but one of them"
+            )
+
+    @property
+    def seam_strip(self) -> float:
+        """The largest width of strips along seams; 0 for none."""
+        return max(self.seam_overlap or 0.0, self.seam_flange or 0.0)
 
     def of_solid(self, sheet: float) -> Finish:
         """Return the finish of a solid of some thickness in millimetres.
@@ -123,12 +138,12 @@ class Finish:
     def room(self, sheet: tuple[float, float], scale: float) -> tuple[float, float]:
         """Return how large patterns may be for a sheet in millimetres, in the design's unit.
 
-        Allowance, tabs and half of the kerf are added about a pattern.
+        Allowance, tabs, strips along seams and half of the kerf are added about a pattern.
 
         >>> Finish(kerf=2.0, allowance=9.0).room((1020.0, 520.0), 1000.0)
         (1.0, 0.5)
         """
-        about = 2.0 * (self.allowance + (self.tabs or 0.0)) + self.kerf
+        about = 2.0 * (self.allowance + (self.tabs or 0.0) + self.seam_strip) + self.kerf
         long, wide = (float(side) - about for side in sheet)
         if min(long, wide) <= 0:
             raise OptionError(

@@ -19,10 +19,17 @@ from gso.workshop.panels import Mating, Panel, Side
 
 #: Turn of a seam's side in the plane, in radians, that is a corner of a part with folds.
 _CORNER = np.radians(30.0)
+#: Difference of angles, in radians, up to which a seam has one angle.
+_SAME = np.radians(1.0)
 
 
 def of_pattern(
-    points: Array, pattern: Pattern, label: Ints, local: Ints, corners: bool = False
+    points: Array,
+    pattern: Pattern,
+    label: Ints,
+    local: Ints,
+    corners: bool = False,
+    angles: Array | None = None,
 ) -> list[Mating]:
     """Find the seams of a pattern that is cut.
 
@@ -36,6 +43,8 @@ def of_pattern(
     corners : bool
         Whether seams end at corners of the panels, as those of nets, whose edges are glued or
         welded one by one.
+    angles : ndarray, (s,), optional
+        Angle between the faces at each seam edge.
     """
     seams = pattern.seams
     if not len(seams):
@@ -44,8 +53,10 @@ def of_pattern(
     sides = label[seams[:, :, 0]]
     ahead = _directed(pattern, seams)
     known: dict[tuple[int, int], tuple[Ints, bool]] = {}
+    turn: dict[tuple[int, int], float] = {}
     for k, (a, b) in enumerate(edges.tolist()):
         known[a, b], known[b, a] = (seams[k], ahead[k]), (seams[k][:, ::-1], not ahead[k])
+        turn[a, b] = turn[b, a] = np.nan if angles is None else float(angles[k])
     out = []
     for _, line in chains(edges, sides):
         both: list[list[int]] = [[], []]
@@ -60,7 +71,10 @@ def of_pattern(
             turned[1:-1] = (_turns(pattern.flat[table]) > _CORNER).any(axis=0)
         for a, b in pairwise([0, *np.flatnonzero(turned).tolist(), len(line) - 1]):
             one, two = (_side(side, label, local) for side in table[:, a : b + 1])
-            out.append(Mating(0, arc_lengths(points[line[a : b + 1]]), one, two))
+            own = [turn[ends] for ends in pairwise(line[a : b + 1].tolist())]
+            angle = np.inf if np.ptp(own) > _SAME else float(np.mean(own))
+            along = arc_lengths(points[line[a : b + 1]])
+            out.append(Mating(0, along, one, two, angle=angle))
     return out
 
 

@@ -73,6 +73,7 @@ def page(certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing]) ->
         text = f"{part.name}: {wide:.1f} x {high:.1f} mm"
         text += f", {part.count} times" if part.count > 1 else ""
         text += "".join(f"; {zone.in_words()}" for zone in part.zones)
+        text += f"; made of {part.made_of}" if part.faces else ""
         lines.append(_figure(Drawing((part,)), text, 240))
     if len(parts) > _SHOWN:
         lines.append(f"<p>and {len(parts) - _SHOWN} more</p>")

@@ -38,6 +38,8 @@ class Panel:
         Number of the zone that each bend is a line of; -1 for those of none, which are folded.
     zones : tuple of Zone
         Round faces, which are bent as a whole.
+    faces : tuple of str
+        Names of the faces of a CAD file that it is made of.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Panel:
     radii: Array = field(default_factory=lambda: np.empty(0))
     zone: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     zones: tuple[Zone, ...] = ()
+    faces: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.zone):
@@ -122,6 +125,9 @@ class Mating:
         The same points on both sides.
     common : bool
         Whether both sides are one curve in space; else they follow it within a distance.
+    angle : float
+        Angle between the faces on both sides in radians, positive for mountain folds, 0 where the
+        surface is smooth; infinite where it changes along the seam, and NaN where it is not known.
     """
 
     number: int
@@ -129,6 +135,7 @@ class Mating:
     one: Side
     two: Side
     common: bool = True
+    angle: float = np.nan
 
     @property
     def length(self) -> float:
@@ -174,7 +181,9 @@ class Made:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return panels and seams as arrays by name."""
-        said = json.dumps([[panel.name, panel.zones] for panel in self.panels]).encode()
+        said = json.dumps(
+            [[panel.name, panel.zones, panel.faces] for panel in self.panels]
+        ).encode()
         out: dict[str, np.ndarray] = {"names": np.frombuffer(said, np.uint8)}
         for k, panel in enumerate(self.panels):
             parts = (panel.surface.vertices, panel.surface.faces, panel.flat)
@@ -184,6 +193,7 @@ class Made:
             out[f"seam{k}_along"] = seam.along
             out[f"seam{k}_number"] = np.array(seam.number)
             out[f"seam{k}_common"] = np.array(int(seam.common))
+            out[f"seam{k}_angle"] = np.array(seam.angle)
             for name, side in (("one", seam.one), ("two", seam.two)):
                 out[f"seam{k}_{name}_edges"] = side.edges
                 out[f"seam{k}_{name}_shares"] = side.shares
@@ -201,13 +211,14 @@ class Made:
         """
         try:
             panels = []
-            for k, (own, zones) in enumerate(json.loads(data["names"].tobytes())):
-                points, faces, flat, bends, angles, radii, zone = (
+            for k, (own, zones, faces) in enumerate(json.loads(data["names"].tobytes())):
+                points, table, flat, bends, angles, radii, zone = (
                     data[f"panel{k}_{part}"] for part in _ARRAYS
                 )
-                surface = Mesh(points, faces)
+                surface = Mesh(points, table)
                 known = tuple(Zone(*row) for row in zones)
-                panels.append(Panel(str(own), surface, flat, bends, angles, radii, zone, known))
+                lines = (bends, angles, radii, zone, known)
+                panels.append(Panel(str(own), surface, flat, *lines, tuple(faces)))
             matings: list[Mating] = []
             while f"seam{len(matings)}_along" in data:
                 k = len(matings)
@@ -220,7 +231,8 @@ class Made:
                     for side in ("one", "two")
                 )
                 number, common = int(data[f"seam{k}_number"]), bool(data[f"seam{k}_common"])
-                matings.append(Mating(number, data[f"seam{k}_along"], one, two, common))
+                angle = float(data[f"seam{k}_angle"])
+                matings.append(Mating(number, data[f"seam{k}_along"], one, two, common, angle))
         except (KeyError, ValueError, TypeError) as error:
             raise MeshError(f"the arrays of {name} do not fit each other: {error}") from None
         return cls(name, tuple(panels), tuple(matings), record)

@@ -12,6 +12,9 @@ from gso.geometry.polygon import signed_area
 from gso.pattern import Bend, Zone
 from gso.typing import Array
 
+#: Number of faces that are named in words.
+_NAMED = 6
+
 
 @dataclass(frozen=True, eq=False)
 class Label:
@@ -79,14 +82,16 @@ class Part:
     marks : tuple of ndarray, (k, 2)
         Lines to engrave.
     seams : tuple of ndarray, (k, 2)
-        Lines to sew, glue or weld along, inside an allowance; closed if the first point is
-        repeated.
+        Lines to sew, glue or weld along, inside an allowance or an overlap; closed if the first
+        point is repeated.
     notches : tuple of Notch
     labels : tuple of Label
     grain : ndarray, (2,), or None
         Direction of the grain, a unit vector; None if any will do.
     count : int
         How many of it are needed.
+    faces : tuple of str
+        Names of the faces of a CAD file that it is made of.
     """
 
     name: str
@@ -101,11 +106,19 @@ class Part:
     grain: Array | None = None
     count: int = 1
     zones: tuple[Zone, ...] = ()
+    faces: tuple[str, ...] = ()
 
     @cached_property
     def area(self) -> float:
         """Area in square millimetres, without holes."""
         return signed_area(self.outline) + sum(signed_area(hole) for hole in self.holes)
+
+    @property
+    def made_of(self) -> str:
+        """The faces of a CAD file that it is made of, in words; empty if there are none."""
+        return ", ".join(self.faces[:_NAMED]) + (
+            f" and {len(self.faces) - _NAMED} more" if len(self.faces) > _NAMED else ""
+        )
 
     @property
     def size(self) -> tuple[float, float]:
@@ -141,6 +154,7 @@ class Part:
             holes=tuple(hole[::-1] for hole in over.holes),
             seams=tuple(line[::-1] for line in over.seams),
             bends=tuple(bend._replace(angle=-bend.angle) for bend in over.bends),
+            zones=tuple(zone._replace(angle=-zone.angle) for zone in over.zones),
         )
 
     def _mapped(self, turn: Array, shift: Array, spin: Callable[[float], float]) -> Part:

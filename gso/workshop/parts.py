@@ -18,6 +18,7 @@ from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
 from gso.workshop.part import Label, Notch, Part
 from gso.workshop.polygons import moved, region, roomiest
+from gso.workshop.seam_strips import with_strips
 from gso.workshop.tabs import TabSeam, with_tabs
 from gso.workshop.thickness import thickened
 
@@ -47,6 +48,8 @@ class Joint:
         Length of the seam in space.
     first : bool
         Whether it is the side that gets tabs.
+    angle : float
+        Angle between the faces on both sides, as that of a :class:`Mating`.
     """
 
     number: int
@@ -54,6 +57,7 @@ class Joint:
     along: Array
     length: float
     first: bool
+    angle: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +109,12 @@ def fitted(
     return Fitted(made, scale, panels, drawn, *cut(made.panels, holes, flats))
 
 
-def parts_from(fitted: Fitted, finish: Finish) -> list[Part]:
-    """Make the parts of fitted panels."""
+def parts_from(fitted: Fitted, finish: Finish) -> tuple[list[Part], list[int]]:
+    """Make the parts of fitted panels.
+
+    Also return the numbers of the seams along which no tab, overlap or flange is possible where
+    one is asked for.
+    """
     panels = fitted.panels
     joints: list[list[Joint]] = [[] for _ in panels]
     seams = []
@@ -119,13 +127,17 @@ def parts_from(fitted: Fitted, finish: Finish) -> list[Part]:
         seams.append(both)
     bare = [_bare(*own) for own in zip(panels, fitted.marks, fitted.holes, strict=True)]
     tabs = [_tab_seams(number, seams, bare) for number in range(len(panels))]
+    missing: list[int] = []
     if finish.registration is not None:
         bare = _registered(bare, seams, finish, *finish.registration)
     if finish.tabs is not None or finish.numbers is not None:
         numbered = finish.notches is None or finish.numbers is not None
         numbers = (finish.labels or _NUMBERS) if numbered else None
-        bare = with_tabs(bare, tabs, finish.tabs, numbers=numbers, place=finish.numbers)
-    return [_finished(*own, finish) for own in zip(bare, joints, strict=True)]
+        bare, missing = with_tabs(bare, tabs, finish.tabs, numbers=numbers, place=finish.numbers)
+    if finish.seam_strip:
+        widths = (finish.seam_overlap, finish.seam_flange)
+        bare, missing = with_strips(bare, tabs, *widths, finish.thickness)
+    return [_finished(*own, finish) for own in zip(bare, joints, strict=True)], missing
 
 
 def scaled(panels: Sequence[Panel], scale: float, finish: Finish) -> list[Panel]:
@@ -154,6 +166,7 @@ def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
         drawn(panel.lines),
         marks=tuple(marks),
         zones=panel.zones,
+        faces=panel.faces,
     )
 
 
@@ -186,7 +199,8 @@ def _tab_seams(
             if own == number:
                 at = here.length - here.along
                 line = np.stack([np.interp(at, there.along, c) for c in there.line.T], axis=1)
-                out.append(TabSeam(here.number, here.line, line, parts[other], here.first))
+                seam_line = (here.line, line, parts[other])
+                out.append(TabSeam(here.number, *seam_line, here.first, here.angle))
     return out
 
 
@@ -213,7 +227,7 @@ def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) ->
         along = arc_lengths(line) - np.interp(0.5 * length, along, own) + 0.5 * length
     if not first:
         line, along = line[::-1], length - along[::-1]
-    return Joint(seam.number, line, along, length, first)
+    return Joint(seam.number, line, along, length, first, seam.angle)
 
 
 def _outline(panel: Panel, side: Side) -> tuple[Array, Array]:
@@ -308,8 +322,16 @@ def _registered(
 
 
 def _name(part: Part, height: float) -> tuple[Label, ...]:
-    """Place the name where there is most room, no larger than fits."""
+    """Place the name where there is most room, no larger than fits; below it what it is made of."""
     middle, room = roomiest(region(part.outline, part.holes))
-    # A letter is about 0.7 of its height wide.
-    fits = 2.0 * room / max(0.7 * len(part.name), 1.0)
-    return (Label(part.name, middle, min(height, fits)),) if room > 0 else ()
+
+    def label(text: str, below: float, most: float) -> Label:
+        # A letter is about 0.7 of its height wide.
+        high = min(most, 2.0 * room / max(0.7 * len(text), 1.0))
+        return Label(text, middle - [0.0, below], high)
+
+    if not room > 0:
+        return ()
+    name = label(part.name, 0.0, height)
+    said = (label(part.made_of, name.height, 0.5 * name.height),) if part.faces else ()
+    return (name, *said)

@@ -34,6 +34,8 @@ def of_surface(
     record: Json,
     folded: Folded = _NO_FOLDS,
     zones: Sequence[Zone] = (),
+    angles: Array | None = None,
+    made_of: tuple[Ints, Sequence[tuple[str, ...]]] | None = None,
 ) -> Made:
     """Divide a surface with a pattern into panels.
 
@@ -49,11 +51,15 @@ def of_surface(
         Bend lines: rulings of round faces, and folds.
     zones : sequence of Zone, optional
         Round faces, by the numbers that bend lines have.
+    angles : ndarray, (s,), optional
+        Angle between the faces at each seam edge.
+    made_of : (ndarray of int (t,), sequence of tuple of str), optional
+        A number of each face of the pattern, and the names of the faces of a CAD file by it.
     """
-    panels, label, local = _divided(surface.vertices, pattern, folded)
+    panels, label, local = _divided(surface.vertices, pattern, folded, made_of)
     panels = [_with_zones(panel, zones) for panel in panels]
     corners = len(folded.edges) > 0
-    matings = of_pattern(surface.vertices, pattern, label, local, corners)
+    matings = of_pattern(surface.vertices, pattern, label, local, corners, angles)
     return Made(name, _named(panels, [name] * len(panels)), numbered(matings), record)
 
 
@@ -90,7 +96,12 @@ def _named(panels: list[Panel], names: list[str]) -> tuple[Panel, ...]:
     return tuple(out)
 
 
-def _divided(points: Array, pattern: Pattern, folded: Folded) -> tuple[list[Panel], Ints, Ints]:
+def _divided(
+    points: Array,
+    pattern: Pattern,
+    folded: Folded,
+    made_of: tuple[Ints, Sequence[tuple[str, ...]]] | None = None,
+) -> tuple[list[Panel], Ints, Ints]:
     """Return the panels of a pattern, and the panel and the number in it of each vertex."""
     parts = sorted(split(pattern.mesh), key=lambda part: -part.area)
     label, local = (np.full(len(pattern.flat), -1) for _ in range(2))
@@ -102,7 +113,12 @@ def _divided(points: Array, pattern: Pattern, folded: Folded) -> tuple[list[Pane
         surface = part.mesh.replaced(points[pattern.vertex[part.vertices]])
         lines = [local[folded.edges[own]], folded.angles[own], folded.radii[own]]
         lines += [folded.zone[own]] if len(folded.zone) else []
-        panels.append(Panel("", surface, pattern.flat[part.vertices], *lines))
+        panel = Panel("", surface, pattern.flat[part.vertices], *lines)
+        if made_of is not None:
+            of_face, names = made_of
+            every = (name for k in np.unique(of_face[part.faces]).tolist() for name in names[k])
+            panel = replace(panel, faces=tuple(dict.fromkeys(every)))
+        panels.append(panel)
     return panels, label, local
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.geometry.polygon import arc_lengths
 from gso.geometry.steady import steady
+from gso.pattern import Bend
 from gso.typing import Array
 from gso.workshop.part import Label, Part
 from gso.workshop.polygons import common, region, rings, united, without
@@ -45,6 +46,8 @@ class TabSeam:
         The other part.
     tabs : bool
         Whether this side gets the tabs.
+    angle : float
+        Angle between the faces on both sides, as that of a :class:`Mating`.
     """
 
     number: int
@@ -52,6 +55,7 @@ class TabSeam:
     other: Array
     glued: Part
     tabs: bool
+    angle: float = np.nan
 
 
 def with_tabs(
@@ -61,7 +65,7 @@ def with_tabs(
     *,
     numbers: float | None = None,
     place: str | None = None,
-) -> list[Part]:
+) -> tuple[list[Part], list[int]]:
     """Add trapezoidal tabs along the seams of parts, and the seams' numbers.
 
     A tab lies within the face of the other part that it is glued to, and takes at most half of
@@ -81,6 +85,12 @@ def with_tabs(
     place : {"inside", "outside"}, optional
         Where numbers stand: beside seams in the part, or on the longest tab of a seam, otherwise
         outside the part. When not given, on the longest tab, otherwise in the part.
+
+    Returns
+    -------
+    parts : list of Part
+    bare : list of int
+        Numbers of the seams that should have tabs, and have none on either side.
     """
     first = [_with_tabs(*own, width) for own in zip(parts, seams, strict=True)]
     both = [
@@ -89,10 +99,11 @@ def with_tabs(
         for seam, tabs in zip(own, some, strict=True)
     ]
     bare = {seam.number for seam, tabs in both if seam.tabs and not tabs}
-    out = []
+    out, glued = [], set()
     for (part, some), own in zip(first, seams, strict=True):
         others = [replace(x, tabs=x.number in bare and not x.tabs) for x in own]
         made, more = _with_tabs(part, others, width)
+        glued |= {seam.number for seam, tabs in zip(own, more, strict=True) if tabs}
         if numbers is not None:
             labels = (
                 _number(seam, [*one, *two], numbers, place)
@@ -100,7 +111,20 @@ def with_tabs(
             )
             made = replace(made, labels=(*made.labels, *labels))
         out.append(made)
-    return out
+    return out, [] if width is None else sorted(bare - glued)
+
+
+def without_tabs(bare: Sequence[int]) -> list[str]:
+    """Name the seams without tabs in a note; none if there are none.
+
+    >>> without_tabs([3, 7])
+    ['seams 3, 7 have no tab: it would lie on a part or beside the face that it is glued to']
+    """
+    if not bare:
+        return []
+    names = f"seam{'s' if len(bare) > 1 else ''} {', '.join(map(str, bare))}"
+    has = "have" if len(bare) > 1 else "has"
+    return [f"{names} {has} no tab: it would lie on a part or beside the face that it is glued to"]
 
 
 def _with_tabs(
@@ -112,12 +136,14 @@ def _with_tabs(
     if width is None or whole.geom_type != "Polygon":
         return part, found
     for seam, added in zip(seams, found, strict=True):
-        for piece, there in _divided(seam.line, seam.other, width) if seam.tabs else ():
-            room = _room(seam.glued, piece, there)
+        for piece, there in divided(seam.line, seam.other, width) if seam.tabs else ():
+            # Both sides of the seam may differ by their strain.
+            slack = 0.01 * float(np.linalg.norm(piece[-1] - piece[0]))
+            face = room(seam.glued, piece, there, slack)
+            first, last = (min(0.25 * np.pi, 0.5 * x) for x in face_angles(seam.glued, there))
             for share in _SHARES:
-                corners = _tab(piece, share * width, _angles(seam.glued, there))
-                tab = region(corners)
-                if tab.area <= 0 or without(tab, room).area > _ON * tab.area:
+                tab = region(_tab(piece, share * width, (first, last)))
+                if tab.area <= 0 or without(tab, face).area > _ON * tab.area:
                     continue
                 joined = united(whole, tab) if common(whole, tab).area <= _ON * tab.area else None
                 if joined is not None:
@@ -129,8 +155,10 @@ def _with_tabs(
     return replace(part, outline=outline, holes=holes, creases=(*part.creases, *creases)), found
 
 
-def _divided(line: Array, other: Array, width: float) -> list[tuple[Array, Array]]:
-    """Divide both sides of a seam into pieces of limited length and turn."""
+def divided(
+    line: Array, other: Array, width: float, longest: float = _LENGTH
+) -> list[tuple[Array, Array]]:
+    """Divide both sides of a seam into pieces of limited turn and length, in widths."""
     way = np.diff(line, axis=0)
     keep = np.r_[True, np.linalg.norm(way, axis=1) > 0]
     line, other = line[keep], other[keep]
@@ -140,7 +168,7 @@ def _divided(line: Array, other: Array, width: float) -> list[tuple[Array, Array
     angle = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
     along = np.cumsum(np.linalg.norm(way, axis=1))
     turned = np.cumsum(np.abs(np.diff(angle, prepend=angle[0])))
-    number = np.maximum(along / (_LENGTH * width), turned / _TURN).astype(np.int64)
+    number = np.maximum(along / (longest * width), turned / _TURN).astype(np.int64)
     ends = np.flatnonzero(np.diff(number)) + 1
     stops = [0, *ends.tolist(), len(line) - 1]
     return [(line[a : b + 1], other[a : b + 1]) for a, b in pairwise(stops) if b > a]
@@ -162,18 +190,17 @@ def _tab(piece: Array, width: float, angles: tuple[float, float]) -> Array:
     return np.concatenate([piece, [last, first]])
 
 
-def _angles(glued: Part, there: Array) -> tuple[float, float]:
-    """Return the angles of a tab at the first and the last point of a piece of a seam.
+def face_angles(part: Part, line: Array) -> tuple[float, float]:
+    """Return the angles to the right of a line at its ends, up to an outline or a sharp bend.
 
-    They are half of the angles of the face that it is glued to, and 45 degrees at most.
+    The line is on the outline of the part.
     """
-    lines = [np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in _loops(glued)]
-    lines += [bend.line[None] for bend in glued.bends if abs(bend.angle) > _TURN]
+    lines = [np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in _loops(part)]
+    lines += [bend.line[None] for bend in _sharp(part)]
     edges = np.concatenate(lines)
-    size = float(np.ptp(glued.outline, axis=0).max())
+    size = float(np.ptp(part.outline, axis=0).max())
     found = []
-    # The face is to the right of the seam, seen from this part.
-    for at, ahead, side in ((there[0], there[-1], -1.0), (there[-1], there[0], 1.0)):
+    for at, ahead, side in ((line[0], line[-1], -1.0), (line[-1], line[0], 1.0)):
         base = ahead - at
         ends = np.concatenate([edges[:, ::-1], edges])
         ends = ends[np.linalg.norm(ends[:, 0] - at, axis=1) < 1e-6 * size]
@@ -182,37 +209,48 @@ def _angles(glued: Part, there: Array) -> tuple[float, float]:
         turn = side * turn % (2.0 * np.pi)
         # An edge along the seam itself is no side of the face.
         inner = turn[(turn > 1e-3) & (turn < 2.0 * np.pi - 1e-3)]
-        found.append(min(0.25 * np.pi, 0.5 * float(inner.min(initial=np.pi))))
+        found.append(float(inner.min(initial=np.pi)))
     return found[0], found[1]
+
+
+def _sharp(part: Part) -> list[Bend]:
+    """Return the bends that end a face: sharp ones that are no lines of what is rolled."""
+    rolled = [k for k, zone in enumerate(part.zones) if not zone.pressed]
+    return [bend for bend in part.bends if abs(bend.angle) > _TURN and bend.zone not in rolled]
 
 
 def _loops(part: Part) -> list[Array]:
     return [part.outline, *part.holes]
 
 
-def _room(glued: Part, piece: Array, there: Array) -> Geometry:
-    """Return the face that a tab is glued to, laid beside the seam.
+def beside(piece: Array, there: Array) -> Callable[[Array], Array]:
+    """Return the motion that lays points of the other part beside the seam."""
+    here, start = piece[-1] - piece[0], there[-1] - there[0]
+    turn = complex(*here) / complex(*start) if np.any(start) else 1.0 + 0.0j
+    turn /= abs(turn)
+    matrix = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
+    shift = 0.5 * (piece[0] + piece[-1]) - 0.5 * (there[0] + there[-1]) @ matrix
+    return lambda points: np.asarray(points @ matrix + shift)
+
+
+def room(glued: Part, piece: Array, there: Array, slack: float) -> Geometry:
+    """Return the face that a tab is glued to, laid beside the seam and wider by `slack`.
 
     It is bounded by the outline of the other part and by its sharp bends.
     """
     import shapely
 
     shape = region(glued.outline, glued.holes)
-    folds = [shapely.LineString(b.line) for b in glued.bends if abs(b.angle) > _TURN]
+    folds = [shapely.LineString(bend.line) for bend in _sharp(glued)]
     if folds:
         cut = shapely.buffer(shapely.MultiLineString(folds), _CUT, cap_style="square")
         shape = without(shape, cut)
     faces = shapely.get_parts(shape)
     middle = shapely.LineString(_inner(there))
     shape = shapely.GeometryCollection(faces[shapely.distance(faces, middle) < _NEAR].tolist())
-    here, start = piece[-1] - piece[0], there[-1] - there[0]
-    turn = complex(*here) / complex(*start) if np.any(start) else 1.0 + 0.0j
-    turn /= abs(turn)
-    matrix = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
-    shift = 0.5 * (piece[0] + piece[-1]) - 0.5 * (there[0] + there[-1]) @ matrix
-    parts = shapely.get_parts(shapely.transform(shape, lambda points: points @ matrix + shift))
-    # Both sides of the seam may differ by their strain, and the cut along bends is no gap.
-    slack = 0.01 * float(np.linalg.norm(here))
+    parts = shapely.get_parts(shapely.transform(shape, beside(piece, there)))
+    # The cut along bends is no gap.
+    slack = max(slack, 2.0 * _CUT) if folds else slack
     return steady(lambda some: shapely.union_all(shapely.buffer(some, slack)), parts)
 
 
