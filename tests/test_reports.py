@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import gso
+from gso.exact import folded_pattern
 from gso.mesh import Mesh
+from gso.recognition import recognise
 from gso.verdict import Code
 from gso.workshop import Bend, Finish, Part, TabSeam, Thickness, with_tabs
 
@@ -302,6 +304,66 @@ def rolled(radius, gone=(), flange=40.0, count=8, rows=7, width=60.0):
     return grid_without(x + 0 * y, y + 0 * x, z + 0 * y, gone)
 
 
+def bent_across(radius, gone=(), flange=40.0, step=2.7, rows=21, width=60.0):
+    """Return triangles of plates with a bend of 90 degrees, without edges where the bend begins.
+
+    The second of every two rows is shifted; some cells are missing.
+    """
+    arc = radius * np.pi / 2
+    count = int((2 * flange + arc) / step) - 1
+    s = np.linspace(0, count * step, count + 1) + 1.3 * (np.arange(rows)[:, None] % 2)
+    turn = np.clip((s - flange) / radius, 0, np.pi / 2)
+    flat, up = np.minimum(s, flange), np.maximum(s - flange - arc, 0)
+    x, z = flat + radius * np.sin(turn), radius * (1 - np.cos(turn)) + up
+    y = np.linspace(0.0, width, rows)[:, None] + 0 * s
+    points, quads = grid_without(x, y, z, gone)
+    return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def slotted(lines, slots):
+    """Return triangles between lines (c, r, 3) across c - 1 flat strips, with slots cut in them.
+
+    A slot (row, first, last) goes from the middle of one strip to the middle of another.
+    """
+    kinds = {(i, row): (i > a) - (i < b) for row, a, b in slots for i in range(a, b + 1)}
+    a, b, c, d = (0, 0), (1, 0), (1, 1), (0, 1)
+    p, q, r, s = (0.5, 0.3), (1, 0.2), (1, 0.8), (0.5, 0.7)
+    first = [(a, b, q), (a, q, p), (a, p, s), (a, s, d), (d, s, r), (d, r, c)]
+    low, high = (0, 0.2), (0, 0.8)
+    table = {
+        None: [(a, b, c), (a, c, d)],
+        -1: first,
+        0: [(a, b, q), (a, q, low), (high, r, c), (high, c, d)],
+        1: [tuple((1 - x, y) for x, y in face[::-1]) for face in first],
+    }
+    corners = [
+        (1 - x) * ((1 - y) * lines[i, j] + y * lines[i, j + 1])
+        + x * ((1 - y) * lines[i + 1, j] + y * lines[i + 1, j + 1])
+        for i in range(lines.shape[0] - 1)
+        for j in range(lines.shape[1] - 1)
+        for face in table[kinds.get((i, j))]
+        for x, y in face
+    ]
+    points, faces = np.unique(np.round(corners, 9), axis=0, return_inverse=True)
+    return points, faces.reshape(-1, 3)
+
+
+def slotted_tube(slots, low=50.0, high=50.0, sides=24, rows=6):
+    t, z = np.linspace(0, 2 * np.pi, sides + 1)[:, None], np.linspace(0, 120.0, rows + 1)
+    r = low + (high - low) * z / 120
+    return slotted(np.stack([r * np.cos(t), r * np.sin(t), z + 0 * t], axis=-1), slots)
+
+
+def slotted_half_tube(slots, radius=15.0, flange=40.0, count=8, rows=7):
+    """Return half a tube between two plates."""
+    t, far = np.linspace(0, np.pi, count + 1), np.full(4, radius)
+    out = np.linspace(-flange, 0, 5)[:-1]
+    x = np.r_[far, radius * np.cos(t), -far][:, None]
+    y = np.r_[out, radius * np.sin(t), out[::-1]][:, None]
+    z = np.linspace(0, 80.0, rows + 1)
+    return slotted(np.stack([x + 0 * z, y + 0 * z, z + 0 * x], axis=-1), slots)
+
+
 def folded(lengths, angles, width=40.0):
     """Return plates side by side, each turned from the one before."""
     turn = np.radians(np.cumsum([0.0, *angles]))
@@ -357,11 +419,20 @@ def radius_of(job):
 
 SHEET = {"finish": Finish(thickness=Thickness(1.5, k=0.5, radius=2.0))}
 L, U, OPEN = ((50, 50), (90,)), ((40, 60, 40), (90, 90)), ((70, 30), (45,))
+#: Cells of a plate across the ends of its bend, slots of half a tube, and its length.
+CELLS = [(3, 13), (3, 14), (4, 13), (4, 14), (9, 17), (9, 18), (15, 20), (15, 21), (16, 20)]
+SLOTS, HALF = [(1, 7, 10), (4, 2, 6), (2, 12, 14)], round(80 + 15 * np.pi, 4)
 #: Kind of report, design, options, what is measured, the right value.
 TABLE = [
     ("2 openings", plate([(1, 1)]), {}, parts_and_holes, (1, 1)),
     ("2 openings", plate([(1, 1), (2, 4)]), {"darts": True}, parts_and_holes, (1, 2)),
     ("2 openings", rolled(15.0, [(2, 8), (4, 8)]), {}, parts_and_holes, (1, 2)),
+    ("2 across", bent_across(15.0, CELLS), {}, parts_and_holes, (1, 3)),
+    ("2 across", bent_across(15.0, CELLS), {"darts": True}, radius_of, 15.0),
+    ("2 in facets", slotted_tube([(1, 3, 4), (3, 8, 12)]), {}, parts_and_holes, (1, 2)),
+    ("2 in facets", slotted_tube([(1, 3, 4)], 50, 90), {}, parts_and_holes, (1, 1)),
+    ("2 in facets", slotted_half_tube(SLOTS), {}, parts_and_holes, (1, 3)),
+    ("2 in facets", slotted_half_tube(SLOTS), {"darts": True}, longest, HALF),
     ("4 folds", folded(*L), SHEET, longest, round(shop_length(*L), 4)),
     ("4 folds", folded(*U), SHEET, longest, round(shop_length(*U), 4)),
     ("4 folds", folded(*OPEN), SHEET, longest, round(shop_length(*OPEN), 4)),
@@ -375,6 +446,39 @@ TABLE = [
     ("10 radius", rolled(15.0, [(2, 8), (4, 8)]), {}, radius_of, 15.0),
     ("10 radius", rolled(8.0, [(3, 2)]), {}, radius_of, 8.0),
 ]
+
+
+@pytest.mark.parametrize(
+    ("design", "kinds"),
+    [
+        (bent_across(15.0, CELLS), ["cylinder", "plane", "plane"]),
+        (slotted_tube([(1, 3, 4), (3, 8, 12)]), ["cylinder"]),
+        (slotted_tube([(r, c, c + 1) for r in range(6) for c in range(0, 24, 2)]), ["cylinder"]),
+        (slotted_tube([(1, 3, 4)], 50, 90), ["cone"]),
+        (slotted_half_tube(SLOTS), ["cylinder", "plane", "plane"]),
+        (slotted_tube([]), ["cylinder"]),
+    ],
+)
+@pytest.mark.parametrize("rounded", [False, True])
+def test_holes_do_not_divide_a_round_face(design, kinds, rounded):
+    points, faces = design
+    if rounded:
+        turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+        points = np.round(points @ turn.T * np.sign(np.linalg.det(turn)), 3)
+    mesh = Mesh(points, faces)
+    shape = recognise(mesh)
+    assert sorted(face.kind for face in shape.faces) == kinds
+    np.testing.assert_array_equal(shape.vertices[: len(mesh.vertices)], mesh.vertices)
+    # Chords of the widest strip are up to 3 % longer or shorter than their arcs, within a strip.
+    change = shape.edge_lengths() / np.linalg.norm(
+        np.diff(
+            shape.vertices[shape.triangles], axis=1, append=shape.vertices[shape.triangles[:, :1]]
+        ),
+        axis=2,
+    )
+    assert np.abs(change - 1).max() < 0.03
+    joined = folded_pattern(mesh)
+    assert joined.parts == 1 and len(joined.bends.angles[joined.bends.radii == 0]) == 0
 
 
 @pytest.mark.parametrize("row", TABLE, ids=[f"{row[0]} {k}" for k, row in enumerate(TABLE)])

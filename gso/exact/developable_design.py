@@ -156,7 +156,7 @@ def folded_pattern(
         sheet=sheet,
     )
     sliced = SlicedPattern.of(shape, joined)
-    bends = ruled_bends(sliced, shape.faces, flat, press_radius)
+    bends = ruled_bends(sliced, shape.faces, flat, press_radius, shape.tolerance)
     folded = joined_bends([bends, fold_edges(sliced, shape)])
     surface = Mesh(sliced.points, sliced.vertex[sliced.faces])
     # In the order of the surface's vertices, as patterns that are not cut have it.

@@ -14,8 +14,8 @@ from gso.pattern import Folded, Zone
 from gso.recognition import BendLine, ShapeFace
 from gso.typing import Array, Flags
 
-#: Distance, relative to the size, within which points are on a line.
-_SAME = 1e-7
+#: Distances, relative to the size, within which points are on a line: at least, and at most.
+_SAME, _COARSEST = 1e-7, 5e-4
 #: Largest angle in radians by which a press bends.
 _HALF_TURN = np.pi + np.radians(1.0)
 
@@ -25,6 +25,7 @@ def ruled_bends(
     faces: Sequence[ShapeFace],
     flat: Array,
     press_radius: tuple[float, float] | None = None,
+    tolerance: float = 0.0,
 ) -> Folded:
     """Return the edges to bend faces along, with angles and radii.
 
@@ -41,8 +42,11 @@ def ruled_bends(
         Flat corners of the shape's triangles, each face in its own place.
     press_radius : (float, float), optional
         As of :func:`gso.exact.folded_pattern`.
+    tolerance : float
+        Error of the coordinates: vertices on one ruling may be so far beside it.
     """
-    near = _SAME * float(np.linalg.norm(np.ptp(sliced.points, axis=0)))
+    size = float(np.linalg.norm(np.ptp(sliced.points, axis=0)))
+    near = float(np.clip(2 * tolerance, _SAME * size, _COARSEST * size))
     found, ruled = [Folded()], []
     for number, face in enumerate(faces):
         if not face.bend_lines:
@@ -51,7 +55,7 @@ def ruled_bends(
             bends = [_middle_line(face)]
         else:
             bends = _rulings(face)
-            rows = ruling_rows(sliced, face, flat, max(3, len(bends)))
+            rows = ruling_rows(sliced, face, flat, max(3, len(bends)), near)
             if rows is not None:
                 found.append(rows._replace(zone=np.full(len(rows.edges), number)))
                 continue

@@ -58,9 +58,8 @@ class _Rows:
     corner: Ints
 
     @classmethod
-    def of(cls, level: Array) -> _Rows:
-        """Find the rows of triangles whose corners have some levels (k, 3)."""
-        near = _SAME * float(np.ptp(level))
+    def of(cls, level: Array, near: float) -> _Rows:
+        """Find the rows of triangles whose corners have some levels (k, 3), equal within `near`."""
         triangle, corner = np.nonzero(np.abs(np.roll(level, -1, axis=1) - level) < near)
         at = level[triangle, corner]
         order = np.argsort(at, kind="stable")
@@ -73,8 +72,12 @@ class _Rows:
         return cls(own, crossing == 0, name, triangle, corner)
 
 
-def ruling_rows(sliced: SlicedPattern, face: ShapeFace, flat: Array, count: int) -> Folded | None:
+def ruling_rows(
+    sliced: SlicedPattern, face: ShapeFace, flat: Array, count: int, near: float
+) -> Folded | None:
     """Bend a round face along rows of its edges, about as many as `count`.
+
+    Vertices within the distance `near` are on one ruling.
 
     The angle of a row is that from half-way to the row before to half-way to the next.
 
@@ -92,9 +95,12 @@ def ruling_rows(sliced: SlicedPattern, face: ShapeFace, flat: Array, count: int)
         # The level of the apex is not defined.
         return None
     level = levels(surface, corners)
-    rows = _Rows.of(level)
     low, high = float(level.min()), float(level.max())
-    near = 2 * _SAME * (high - low)
+    if surface.slope > 0:
+        near = near / float(far.max())
+    near = max(near, _SAME * (high - low))
+    rows = _Rows.of(level, near)
+    near = 2 * near
     inside = np.flatnonzero(rows.clean & (rows.levels > low + near) & (rows.levels < high - near))
     if not len(inside):
         return None

@@ -187,6 +187,11 @@ class FacetGraph:
         table.data[:] = 1.0
         return table
 
+    @cached_property
+    def shared(self) -> Flags:
+        """Which vertices belong to several facets, (n,)."""
+        return np.asarray(self.facet_vertices.getnnz(axis=0) > 1)
+
     def connected(self, member: Flags, joined: Flags | None = None) -> Ints:
         """Label the connected parts of triangles (t,); -1 for those that are no members.
 

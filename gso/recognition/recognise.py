@@ -20,6 +20,7 @@ from gso.recognition.round_surface import RoundSurface
 from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
 from gso.recognition.smooth_torsal import smooth_image
+from gso.recognition.tangent_rulings import divide_at_tangents
 from gso.typing import Array, Flags, Ints, MeshLike
 
 #: Triangles of a smooth face at least, where more than this share of the area is free.
@@ -95,6 +96,9 @@ def recognise(
     given = None if surface.attributes is None else surface.attributes.surfaces
     known = GivenFaces.of(graph, given)
     regions = [*known.regions, *round_regions(graph, known.unknown)]
+    divided = np.arange(len(graph.triangles))
+    if given is None:
+        graph, divided, regions = divide_at_tangents(graph, regions)
     rest = np.ones(len(graph.triangles), bool)
     for member in (*(region.member for region in regions), *known.torsal):
         rest &= ~member
@@ -107,7 +111,7 @@ def recognise(
     faces += _other_faces(graph, patches, source, limit)
     faces += known.torsal_faces(graph, source, step)
     faces.sort(key=lambda face: int(face.triangles[0]))
-    return Recognised(graph.points, graph.triangles, source, tuple(faces), graph.tolerance)
+    return Recognised(graph.points, graph.triangles, divided[source], tuple(faces), graph.tolerance)
 
 
 def _opened(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.geometry import box_diagonal
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
 from gso.recognition.round_surface import RoundSurface, fit_quadrics, fit_round
@@ -23,10 +24,13 @@ _WIDEST, _WIDER, _NARROW = np.radians(62.0), 3.0, np.radians(8.0)
 #: Facets around the axis from which on they are a smooth surface.
 _SEVERAL = 2.5
 #: Angle between the normals of a triangle and of the surface, in radians.
-_TILTED = np.radians(35.0)
+TILTED = np.radians(35.0)
 #: Points of a seed region, their least number for a cylinder (a cone needs one more), and seeds
 #: that are fitted together.
 _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
+#: Share of the vertices of a long facet that are on its folds if it is a strip between rulings,
+#: and tolerance relative to the size up to which such strips are tried.
+_STRIP, _FINE = 0.9, 1e-6
 #: Largest smooth parts that are tried as a whole.
 _PARTS = 100
 #: Seeds that are tried at most.
@@ -111,15 +115,20 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
     found = []
     table = graph.facet_vertices
     sizes = np.diff(table.indptr)
+    small = sizes <= _POINTS // 2
+    if graph.tolerance <= _FINE * box_diagonal(graph.points):
+        # A long strip between two rulings has few vertices inside. Where coordinates are rounded,
+        # several strips of any torsal surface are on a cone.
+        small |= table @ graph.shared.astype(float) >= _STRIP * sizes
     neighbours = _neighbours_along if along else _neighbours
-    near = neighbours(graph, free, sizes <= _POINTS // 2)
+    near = neighbours(graph, free, small)
     order = np.random.default_rng(0).permutation(table.shape[0])
     open_facets = np.zeros(table.shape[0], bool)
     open_facets[graph.facet[free]] = True
     if along:
         # A single triangle has no direction.
         open_facets &= np.bincount(graph.facet) > 1
-    order = order[open_facets[order] & (sizes[order] <= _POINTS // 2)][:_SEEDS]
+    order = order[open_facets[order] & small[order]][:_SEEDS]
     tried, failures = np.zeros(table.shape[0], bool), 0
     first = np.zeros(table.shape[0], np.int64)
     first[graph.facet[::-1]] = np.arange(len(graph.facet))[::-1]
@@ -196,7 +205,7 @@ def _promising(
         around.data[:] = 1.0
     around.sort_indices()
     vertices = (around @ graph.facet_vertices).tocsr()
-    ids, given = _padded(vertices)
+    ids, given = _padded(_without_inner(graph, vertices))
     points = graph.points[ids]
     n = graph.facet_normals
     one = np.asarray(around.sum(axis=1)).ravel()
@@ -230,6 +239,13 @@ def _promising(
             worst[left], found[left] = fits.worst, fits.axis
     order = np.argsort(worst, kind="stable")
     return order[worst[order] <= graph.tolerance], around, found
+
+
+def _without_inner(graph: FacetGraph, table: csr_matrix) -> csr_matrix:
+    """Leave out vertices of one facet only in rows (k, n) that have enough others."""
+    shared = table.multiply(graph.shared).tocsr()
+    few = np.asarray(shared.getnnz(axis=1)) <= _FEWEST
+    return (shared + table.multiply(few[:, None])).tocsr() if few.any() else shared
 
 
 def _padded(table: csr_matrix) -> tuple[Ints, Flags]:
@@ -274,11 +290,11 @@ def _grown(
     """Fit a surface and add the triangles on it, until none is added."""
     member, surface = seed, None
     for _ in range(_ROUNDS):
-        surface = _fitted(graph, member, axis, conical)
+        surface = _fitted(graph, member, axis, conical, surface)
         if surface is None:
             return None
         axis = surface.axis
-        new = _members(graph, surface, member, free)
+        new = members(graph, surface, member, free)
         if (new == member).all():
             break
         if (new & seed).sum() < _KEPT * seed.sum():
@@ -288,10 +304,21 @@ def _grown(
 
 
 def _fitted(
-    graph: FacetGraph, member: Flags, axis: Array | None, conical: bool
+    graph: FacetGraph,
+    member: Flags,
+    axis: Array | None,
+    conical: bool,
+    before: RoundSurface | None,
 ) -> RoundSurface | None:
-    """Fit a surface to the vertices of a region; None where they lie far from any."""
+    """Fit a surface to the vertices of a region; None where they lie far from any.
+
+    Vertices within facets do not count: in one facet only, or inside the surface before.
+    """
     ids = np.unique(graph.triangles[member])
+    if before is not None:
+        ids = ids[before.distances(graph.points[ids]) >= -_LOOSE * graph.tolerance]
+    elif graph.shared[ids].sum() >= _FEWEST + conical:
+        ids = ids[graph.shared[ids]]
     if len(ids) < _FEWEST + conical:
         return None
     ids = ids[np.linspace(0, len(ids) - 1, min(len(ids), _ENOUGH)).round().astype(int)]
@@ -316,11 +343,15 @@ def _fitted(
     return fits.surface(best)
 
 
-def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flags) -> Flags:
-    """Free triangles on a surface that are connected to a region, or to most of it."""
+def members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flags) -> Flags:
+    """Free triangles on a surface that are connected to a region, or to most of it.
+
+    Vertices of holes that were cut into the facets of a mesh are inside the surface.
+    """
     angle, rho, height = surface.coordinates(graph.points)
     radius = surface.radius + surface.slope * height
-    on = np.abs(rho - radius) * np.cos(surface.half_angle) <= graph.tolerance
+    depth = (radius - rho) * np.cos(surface.half_angle)
+    on = np.abs(depth) <= graph.tolerance
     if surface.slope:
         on &= radius >= -2 * graph.tolerance
     spans = triangle_spans(surface, angle, rho, graph.triangles)
@@ -328,10 +359,19 @@ def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flag
     sign = np.sign((toward * graph.areas)[inside].sum())
     typical = np.quantile(spans[inside], 0.75)
     widest = min(max(_WIDER * typical, _NARROW), _WIDEST)
-    fits = free & on[graph.triangles].all(axis=1) & (spans <= widest)
+    fits = free & (spans <= widest)
+    sag = radius * np.cos(surface.half_angle) * (1.0 - np.cos(widest / 2))
+    sunk = (depth > graph.tolerance) & (depth <= sag)
+    whole = on[graph.triangles].all(axis=1)
+    if sunk.any():
+        near = fits & (on | sunk)[graph.triangles].all(axis=1)
+        near &= sign * toward >= np.cos(TILTED)
+        cut = (on | (sunk & _within_facets(graph, surface, near)))[graph.triangles].all(axis=1)
+        whole |= near & cut & _chordal(graph, surface, on)[graph.facet]
+    fits &= whole
     # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
     # plane that cuts the surface.
-    tilted = sign * toward < np.cos(_TILTED)
+    tilted = sign * toward < np.cos(TILTED)
     area = sign * _turning_areas(surface, angle, height, graph)
     thin = tilted & fits & (area > 1e-9 * np.abs(area).max())
     cut = np.bincount(graph.facet, tilted & ~thin) > 0
@@ -341,6 +381,34 @@ def _members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flag
     if not len(seen):
         return np.zeros_like(free)
     return np.asarray(label == np.bincount(seen).argmax())
+
+
+def _chordal(graph: FacetGraph, surface: RoundSurface, on: Flags) -> Flags:
+    """Mark facets (f,) with three of some vertices (n,), and those whose planes hold rulings."""
+    middle = graph.middles[np.unique(graph.facet, return_index=True)[1]]
+    along = surface.axis[None]
+    if surface.apex is not None:
+        along = middle - surface.apex
+        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    off = np.abs((graph.facet_normals * along).sum(axis=1)) * np.sqrt(graph.facet_areas)
+    known = np.asarray(graph.facet_vertices @ on.astype(float)) >= 3
+    return np.asarray(known | (off <= _LOOSE * graph.tolerance))
+
+
+def _within_facets(graph: FacetGraph, surface: RoundSurface, near: Flags) -> Flags:
+    """Mark the vertices of some triangles (t,) at no fold, or at the end of one across rulings.
+
+    Rulings between facets have their ends on the surface. A vertex in a facet, or where an outline
+    meets an edge between facets that is no ruling, is inside the surface.
+    """
+    a, b = graph.points[graph.ends].transpose(1, 0, 2)
+    folded = near[graph.pairs].all(axis=1) & np.not_equal(*graph.facet[graph.pairs].T)
+    ends, along = graph.ends[folded], (b - a)[folded]
+    cosine = np.einsum("ed,ed->e", along, surface.rulings((a + b)[folded] / 2))
+    ruling = np.abs(cosine) > np.cos(TILTED) * np.linalg.norm(along, axis=1)
+    # A vertex in the middle of a row of edges is at the ends of two.
+    weight = np.repeat(np.where(ruling, 2, 1), 2)
+    return np.asarray(np.bincount(ends.ravel(), weight, len(graph.points)) < 2)
 
 
 def _turning_areas(surface: RoundSurface, angle: Array, height: Array, graph: FacetGraph) -> Array:
@@ -379,8 +447,6 @@ def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Fl
     covered = _covered(angle, rho, ids, typical)
     if float(np.median(spans)) > SMOOTH or covered < _SEVERAL * typical:
         return False
-    if float(np.abs(surface.distances(graph.points[ids])).max()) > graph.tolerance:
-        return False
     # A plane within the tolerance is a plane.
     around_mean = graph.points[ids] - graph.points[ids].mean(axis=0)
     direction = np.linalg.eigh(around_mean.T @ around_mean)[1][:, 0]
@@ -407,7 +473,7 @@ def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
     ends = graph.points[graph.ends[border]]
     along = ends[:, 1] - ends[:, 0]
     cosine = np.einsum("ed,ed->e", along, surface.rulings(ends.mean(axis=1)))
-    ruling = np.abs(cosine) > np.cos(_TILTED) * np.linalg.norm(along, axis=1)
+    ruling = np.abs(cosine) > np.cos(TILTED) * np.linalg.norm(along, axis=1)
     beside = np.where(one, graph.pairs[:, 1], graph.pairs[:, 0])[border][ruling]
     if not len(beside):
         return False
@@ -415,7 +481,8 @@ def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
     off = np.abs(surface.distances(graph.points[graph.triangles[facets]].reshape(-1, 3)))
     worst = np.zeros(int(graph.facet.max()) + 1)
     np.maximum.at(worst, np.repeat(graph.facet[facets], 3), off)
-    return bool((worst[graph.facet[beside]] <= _ALMOST * graph.tolerance).any())
+    # A vertex of a triangle across the end of a bend may be close by chance.
+    return bool((worst[graph.facet[beside]] <= _ALMOST * graph.tolerance).mean() > 0.5)
 
 
 def _has_straight_rulings(
@@ -445,7 +512,7 @@ def _has_straight_rulings(
     along = b - a
     length = np.linalg.norm(along, axis=1)
     cosine = np.abs(np.einsum("ed,ed->e", along, surface.rulings((a + b) / 2)))
-    across = cosine < np.cos(_TILTED) * length
+    across = cosine < np.cos(TILTED) * length
     fold = np.abs(graph.folds[border])
     level = not only_circles
     level |= np.abs(along @ surface.axis) <= _LEVEL * length + 4 * graph.tolerance

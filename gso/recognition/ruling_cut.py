@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.mesh import topology
+from gso.mesh.slicing import subdivided
 from gso.recognition.flat_images import Part, continuous, hole_angles, seam_angle, turns
 from gso.recognition.round_surface import RoundSurface
 from gso.typing import Array, Ints
@@ -102,39 +103,4 @@ def cut_along(
         at = height[a] + share * (height[b] - height[a])
     new = surface.point(np.full(len(a), seam), at)
     points = np.concatenate([part.points, new])
-    table, source = _divided(triangles, edge, len(part.points))
-    return points, table, source
-
-
-def _divided(triangles: Ints, edge: Ints, first: int) -> tuple[Ints, Ints]:
-    """Divide triangles at new vertices `first`, `first` + 1 ... on edges; also return sources."""
-    keys = topology.edge_keys(edge.min(axis=1), edge.max(axis=1), first)
-    order = np.argsort(keys)
-    to = np.roll(triangles, -1, axis=1)
-    wanted = topology.edge_keys(np.minimum(triangles, to), np.maximum(triangles, to), first)
-    place = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
-    middle = np.where(keys[order][place] == wanted, first + order[place], -1)
-    number = (middle >= 0).sum(axis=1)
-    # Turned so that the first edge is divided, and where two are, the first two.
-    start = np.where(
-        number == 2, (np.argmax(middle < 0, axis=1) + 1) % 3, np.argmax(middle >= 0, axis=1)
-    )
-    turn = (start[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(triangles, turn, axis=1).T
-    m, n, o = np.take_along_axis(middle, turn, axis=1).T
-    ids = np.arange(len(triangles))
-    parts = {
-        0: [(a, b, c)],
-        1: [(a, m, c), (m, b, c)],
-        2: [(m, b, n), (a, m, n), (a, n, c)],
-        3: [(a, m, o), (b, n, m), (c, o, n), (m, n, o)],
-    }
-    tables, sources = [], []
-    for count, pieces in parts.items():
-        here = number == count
-        for piece in pieces:
-            tables.append(np.stack(piece, axis=1)[here])
-            sources.append(ids[here])
-    source = np.concatenate(sources)
-    order = np.argsort(source, kind="stable")
-    return np.concatenate(tables)[order], source[order]
+    return points, *subdivided(triangles, len(part.points), edge)
