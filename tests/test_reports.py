@@ -293,6 +293,14 @@ def plate(gone):
     return grid_without(x, y, 0 * x, gone)
 
 
+def cap(width, height, radius, shape, gone):
+    """Return triangles of a part of a sphere above a rectangle, without some cells."""
+    x, y = (np.linspace(-a / 2, a / 2, n + 1) for a, n in zip((width, height), shape, strict=True))
+    x, y = np.meshgrid(x, y)
+    points, quads = grid_without(x, y, np.sqrt(radius**2 - x**2 - y**2), gone)
+    return points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
 def rolled(radius, gone=(), flange=40.0, count=8, rows=7, width=60.0):
     """Return two plates with a bend of 90 degrees between them, without some cells."""
     turn = np.linspace(0, np.pi / 2, count + 1)
@@ -419,20 +427,29 @@ def radius_of(job):
 
 SHEET = {"finish": Finish(thickness=Thickness(1.5, k=0.5, radius=2.0))}
 L, U, OPEN = ((50, 50), (90,)), ((40, 60, 40), (90, 90)), ((70, 30), (45,))
-#: Cells of a plate across the ends of its bend, slots of half a tube, and its length.
-CELLS = [(3, 13), (3, 14), (4, 13), (4, 14), (9, 17), (9, 18), (15, 20), (15, 21), (16, 20)]
+#: Cells of 15 openings in a plate, three at each end of its bend, slots of half a tube, and its length.
+CELLS = [
+    (i + a, j + b)
+    for i in (3, 9, 15)
+    for j in (4, 9, 14, 18, 22)
+    for a, b in ((0, 0), (0, 1), (1, 0), (1, 1))
+]
 SLOTS, HALF = [(1, 7, 10), (4, 2, 6), (2, 12, 14)], round(80 + 15 * np.pi, 4)
+#: Cells of an opening in a cap that becomes strips side by side, none of them in two parts.
+MIDDLE, RULED = np.array([(5, 5), (5, 6), (6, 5), (6, 6)]), {"formulation": "ruled"}
 #: Kind of report, design, options, what is measured, the right value.
 TABLE = [
     ("2 openings", plate([(1, 1)]), {}, parts_and_holes, (1, 1)),
     ("2 openings", plate([(1, 1), (2, 4)]), {"darts": True}, parts_and_holes, (1, 2)),
     ("2 openings", rolled(15.0, [(2, 8), (4, 8)]), {}, parts_and_holes, (1, 2)),
-    ("2 across", bent_across(15.0, CELLS), {}, parts_and_holes, (1, 3)),
+    ("2 across", bent_across(15.0, CELLS), {}, parts_and_holes, (1, 15)),
     ("2 across", bent_across(15.0, CELLS), {"darts": True}, radius_of, 15.0),
     ("2 in facets", slotted_tube([(1, 3, 4), (3, 8, 12)]), {}, parts_and_holes, (1, 2)),
     ("2 in facets", slotted_tube([(1, 3, 4)], 50, 90), {}, parts_and_holes, (1, 1)),
     ("2 in facets", slotted_half_tube(SLOTS), {}, parts_and_holes, (1, 3)),
     ("2 in facets", slotted_half_tube(SLOTS), {"darts": True}, longest, HALF),
+    ("2 strips", cap(100, 90, 110, (14, 12), MIDDLE - 1), RULED, parts_and_holes, (4, 0)),
+    ("2 strips", cap(100, 100, 120, (14, 14), MIDDLE + 1), RULED, parts_and_holes, (4, 0)),
     ("4 folds", folded(*L), SHEET, longest, round(shop_length(*L), 4)),
     ("4 folds", folded(*U), SHEET, longest, round(shop_length(*U), 4)),
     ("4 folds", folded(*OPEN), SHEET, longest, round(shop_length(*OPEN), 4)),
@@ -481,7 +498,13 @@ def test_holes_do_not_divide_a_round_face(design, kinds, rounded):
     assert joined.parts == 1 and len(joined.bends.angles[joined.bends.radii == 0]) == 0
 
 
-@pytest.mark.parametrize("row", TABLE, ids=[f"{row[0]} {k}" for k, row in enumerate(TABLE)])
+@pytest.mark.parametrize(
+    "row",
+    [
+        pytest.param(row, id=f"{row[0]} {k}", marks=[pytest.mark.slow] * (row[2] is RULED))
+        for k, row in enumerate(TABLE)
+    ],
+)
 def test_values_of_reports(row, tmp_path):
     _, design, options, measured, right = row
     job = flat(design, tmp_path, **options)

@@ -10,6 +10,8 @@ import numpy as np
 from gso import parametrization
 from gso.constraints import Compiled, OnPlane, Pins, Relations, Straight, compile_constraints
 from gso.errors import MeshError, OptionError
+from gso.geometry.polygon import rectangle
+from gso.geometry.vectors import unit
 from gso.mesh import Mesh, vertex_normals
 from gso.pipeline import Case, Run
 from gso.pipeline.user_result import pack, record_violations
@@ -119,6 +121,11 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
         return not stopped
 
     found, tried = solve(domain, starts or {"design": domain.normals}, aim, told, conditions)
+    if found is not None and not stopped and _parts(found) > found.surface.strips:
+        # The outline cuts winding strips in several.
+        other, more = solve(domain, {"parallel": _across(domain)}, aim, told, conditions)
+        if other is not None and _preference(aim, other) < _preference(aim, found):
+            found, tried = other, more
     if found is None:
         begun.status = Status.CANCELLED
         return pack(run, begun)
@@ -154,6 +161,26 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
     )
     record_violations(case, moved, result)
     return result
+
+
+def _parts(found: Found) -> int:
+    """Return the number of parts of the strips."""
+    return int(found.surface.pattern.mesh.components.max()) + 1
+
+
+def _preference(aim: Wanted, found: Found) -> tuple[bool, int, bool, float]:
+    """Sort key: what meets the bounds first, then fewer parts, then what is nearer."""
+    return not aim.met(found.surface), _parts(found), *found.order
+
+
+def _across(domain: Domain) -> Array:
+    """Return the normals of the surface, turned across the short side of its flat image."""
+    angle, _ = rectangle(domain.flat)
+    flat = domain.flat - domain.flat.mean(axis=0)
+    points = domain.mesh.vertices - domain.mesh.vertices.mean(axis=0)
+    along = np.array([-np.sin(angle), np.cos(angle)]) @ np.linalg.lstsq(flat, points, rcond=None)[0]
+    along = along / np.linalg.norm(along)
+    return unit(domain.normals - np.outer(domain.normals @ along, along))
 
 
 def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
