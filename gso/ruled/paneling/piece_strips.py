@@ -144,14 +144,22 @@ def _candidates(
     A piece is developable, so that one strip should do; more of them are more parts. Strips that
     follow their piece closely come first, as the sides of their seams fit.
     """
-    left, most = _distance_left(joint, request, light), min(request.options.max_strips, _STRIPS)
-    if light.allowed is None or not request.may_leave_pieces:
-        yield _of_each(joint.shape, request, most, left), False
+    allowed, options, design = light.allowed, request.options, joint.design
+    most, near = min(options.max_strips, _STRIPS), _NEAR * design.diagonal
+    if allowed is None:
+        yield _of_each(joint.shape, request, most, None if options.number else near), False
+        return
+    left = allowed - metrics.largest_distance(light.mesh, joint.shape.design)
+    follow = float(np.clip(left, _LEAST * allowed, _MOST * allowed))
+    if not request.may_leave_pieces:
+        yield _of_each(joint.shape, request, most, follow), False
         return
     # Numbers and distances may be the same.
-    for number, follow in dict.fromkeys([(1, _LEAST * light.allowed), (1, left), (most, left)]):
-        strips = _of_each(joint.shape, request, number, follow)
-        if follow == left:
+    ways = list(dict.fromkeys([(1, _LEAST * allowed), (1, follow), (most, follow)]))
+    # No strips hold the distance near pieces that are much farther away themselves.
+    for number, near in [(1, follow)] if left < -_MOST * allowed else ways:
+        strips = _of_each(joint.shape, request, number, near)
+        if near == follow:
             yield strips, False
         yield strips, True
 
@@ -190,15 +198,6 @@ def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> _
     joint = joint.with_options(joint.options.for_pieces())
     result = solve_pieces(division, joint, request.constraints, request.callback)
     return _Joint(light.design, division if result.pieces is None else result.pieces, result, ())
-
-
-def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) -> float | None:
-    """Return the distance within which strips follow the pieces; None for any."""
-    allowed = light.allowed
-    if allowed is None:
-        return None if request.options.number else _NEAR * joint.design.diagonal
-    left = allowed - metrics.largest_distance(light.mesh, joint.shape.design)
-    return float(np.clip(left, _LEAST * allowed, _MOST * allowed))
 
 
 def _of_each(
