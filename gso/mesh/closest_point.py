@@ -85,9 +85,14 @@ class Nearest:
         shares[shares.sum(axis=1) == 0] = [1.0, 0.0, 0.0]
         return triangle, shares / shares.sum(axis=1, keepdims=True), foot
 
+    def nearest(self, points: Array) -> tuple[Ints, Array]:
+        """Return the triangle nearest to every point (k, 3), and its distance, both (k,)."""
+        squared, triangle, _ = self._query(points)
+        return triangle, np.sqrt(squared)
+
     def distances(self, points: Array) -> Array:
         """Return the distance of every point (k, 3) from the surface, (k,)."""
-        return np.sqrt(self._query(points)[0])
+        return self.nearest(points)[1]
 
     def feet(self, points: Array) -> Feet:
         """Find the closest points to points (k, 3), and the surface's normals there."""

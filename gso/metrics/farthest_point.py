@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from gso.geometry.vectors import cross, lengths
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 _N = TypeVar("_N", bound=NDArray[Any])
 
 #: Largest errors of the distance: relative to it, and to the diagonal.
 ERROR, _SLACK = 5e-4, 1e-6
 #: Times that triangles are halved at most, and triangles in one round.
-_ROUNDS, _MOST = 8, 100_000
+_ROUNDS, _MOST = 16, 100_000
 #: One vertex in so many, those that moved most, is asked for before all others.
 _FIRST = 50
 
@@ -32,7 +32,7 @@ def farthest(
 
     All points of the triangles count, not only the vertices. The distance from one triangle of
     `other` is convex, so it is largest at a corner: this bounds the distance within a triangle.
-    Triangles whose bound exceeds the largest distance so far are halved along all edges.
+    Triangles whose bound exceeds the largest distance so far are halved, across their longest edge.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def farthest(
     -------
     float
         At most 0.05 % and 1e-6 of the diagonal below the largest distance, and never above it.
-        Where triangles were halved eight times, or are too many, it is the largest distance at
+        Where triangles were halved sixteen times, or are too many, it is the largest distance at
         their corners and middles.
 
     Examples
@@ -68,8 +68,7 @@ def farthest(
         asked[:] = False
 
     def ask(vertices: Ints) -> None:
-        foot[vertices], _, place = near.locate(surface.vertices[vertices])
-        distance[vertices] = np.linalg.norm(place - surface.vertices[vertices], axis=1)
+        foot[vertices], distance[vertices] = near.nearest(surface.vertices[vertices])
 
     if vertices is None and np.array_equal(tri, other.triangles):
         # A point is at most as far as that with the same shares of the same triangle.
@@ -90,42 +89,44 @@ def farthest(
         keep = far.max(axis=1) + side.max(axis=1) / np.sqrt(3.0) > enough
         # With one nearest triangle for all three corners, the bound is the largest distance there.
         keep &= (which != np.roll(which, 1, axis=1)).any(axis=1)
-        points, far, which = points[keep], far[keep], which[keep]
-        upper = _upper(points, corner, which)
-        keep = upper > enough
+        keep[keep] = _may_exceed(enough, points[keep], far[keep], corner, which[keep])
         points, far, which = points[keep], far[keep], which[keep]
         if not 0 < len(points) <= _MOST:
             break
-        middle = 0.5 * (points + np.roll(points, -1, axis=1))
-        at, _, place = near.locate(middle.reshape(-1, 3))
-        at, place = at.reshape(-1, 3), place.reshape(-1, 3, 3)
-        away = np.linalg.norm(place - middle, axis=2)
+        # The longest edge first: of long triangles other parts would stay long.
+        turn = (side[keep].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        own = np.arange(len(points))[:, None]
+        points, far, which = points[own, turn], far[own, turn], which[own, turn]
+        middle = 0.5 * (points[:, 0] + points[:, 1])
+        at, away = near.nearest(middle)
         largest = max(largest, float(away.max()))
-        points, far = _quarters(points, middle), _quarters(far, away)
-        which = _quarters(which, at)
+        points, far, which = _halves(points, middle), _halves(far, away), _halves(which, at)
     return largest
 
 
-def _quarters(corners: _N, middles: _N) -> _N:
-    """Return the values at the corners of the four parts of triangles, (4 k, 3, ...)."""
-    a, b, c = (corners[:, k] for k in range(3))
-    p, q, r = (middles[:, k] for k in range(3))
-    parts = [(a, p, r), (p, b, q), (r, q, c), (p, q, r)]
-    out: _N = np.concatenate([np.stack(part, axis=1) for part in parts])  # type: ignore[assignment]
+def _halves(corners: _N, middle: _N) -> _N:
+    """Return the values at the corners of both halves of triangles, (2 k, 3, ...)."""
+    out: _N = np.concatenate([corners, corners])  # type: ignore[assignment]
+    out[: len(middle), 1] = out[len(middle) :, 0] = middle
     return out
 
 
-def _upper(points: Array, corner: Array, which: Ints) -> Array:
-    """Return bounds (k,) on the distance within triangles (k, 3, 3).
+def _may_exceed(bound: float, points: Array, far: Array, corner: Array, which: Ints) -> Flags:
+    """Return whether distances within triangles (k, 3, 3) may exceed a bound.
 
-    `which` are the triangles nearest to the corners, numbers of those with corners `corner`.
+    `which` are the triangles nearest to the corners, numbers of those with corners `corner`, and
+    `far` their distances. Within the bound from all corners, one of them is for all points.
     """
-    bound = np.full(len(points), np.inf)
+    left = np.arange(len(points))
     for k in range(3):
-        target = corner[which[:, k]]
-        away = np.stack([_from_triangle(points[:, i], target) for i in range(3)])
-        bound = np.minimum(bound, away.max(axis=0))
-    return bound
+        over = far[left, k] > bound
+        for other in ((k + 1) % 3, (k + 2) % 3):
+            rest = left[~over]
+            over[~over] = _from_triangle(points[rest, other], corner[which[rest, k]]) > bound
+        left = left[over]
+    out = np.zeros(len(points), bool)
+    out[left] = True
+    return out
 
 
 def _from_triangle(points: Array, triangles: Array) -> Array:

@@ -217,21 +217,16 @@ class RuledSurface:
         """
         points, weight = self.samples()
         there = metrics.point_to_surface(points, design)
-        most = float(there.max())
         back = metrics.point_to_surface(design.vertices[design.used], self.mesh)
-        far = float(back.max())
-        if not sampled:
-            most = metrics.farthest(self.mesh, design, most)
-            far = metrics.farthest(design, self.mesh, far)
-        rim_there, rim_back = 0.0, 0.0
+        most, far = float(there.max()), float(back.max())
         if not parts or design.boundary_loops:
             rim_there, rim_back = metrics.boundary_distance(design, self.mesh)
-        return metrics.Distances(
-            float(weight @ there),
-            most if parts else max(most, rim_there),
-            float(back.mean()),
-            max(far, rim_back),
-        )
+            most, far = most if parts else max(most, rim_there), max(far, rim_back)
+        if not sampled:
+            # What is known already spares most of the search.
+            most = metrics.farthest(self.mesh, design, most)
+            far = metrics.farthest(design, self.mesh, far)
+        return metrics.Distances(float(weight @ there), most, float(back.mean()), far)
 
     def on_ruling(self, line: Array, points: Array) -> Array:
         """Move points (k, 3) to the ruling, or piece of outline, nearest to a line (2, 3)."""

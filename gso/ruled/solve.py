@@ -25,6 +25,9 @@ _COARSE = 16
 _FLAT = 1e-5
 #: Number of strips from which doubling has to lower the largest distance, to this share of it.
 _PAYING, _LESS = 8, 0.95
+#: Number of strips from which the trend of the largest distance counts, and the share of it that
+#: doubling leaves at best: sagittas fall with the square of the width.
+_TREND, _QUARTER = 4, 0.25
 #: Relative tolerance of a bound on the distance.
 _TIGHT = 1e-6
 
@@ -193,9 +196,23 @@ class _Search:
         if self.wanted.strips is not None:
             return False
         found = self.results[count].surface
-        return self.wanted.met(found) or (
-            count > _PAYING and found.farthest > _LESS * self.results[count // 2].surface.farthest
-        )
+        paying = count <= _PAYING or found.farthest <= _LESS * self._far(count // 2)
+        return self.wanted.met(found) or not paying or self._out_of_reach(count)
+
+    def _far(self, count: int) -> float:
+        return self.results[count].surface.farthest
+
+    def _out_of_reach(self, count: int) -> bool:
+        """Return whether the largest number of strips is too far away by the trend of distances.
+
+        The trend is what doubling gains at best, and later what it gained the last two times.
+        """
+        wanted, share = self.wanted, _QUARTER
+        if count < _TREND or wanted.max_deviation is None:
+            return False
+        if count > _PAYING:
+            share = max(share, np.sqrt(self._far(count) / self._far(count // 4)))
+        return self._far(count) * share ** np.log2(wanted.most / count) > wanted.max_deviation
 
     def _bisect(self, job: Job, count: int) -> None:
         """Bisect between half a number of strips, which was too few, and that number."""

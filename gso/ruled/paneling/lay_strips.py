@@ -193,6 +193,8 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
 _CLOSE = 1e-4
 #: Share of the predicted distance that strips along lines may have.
 _FAR = 0.6
+#: Ratio of the distance of pieces to the largest one from which other pieces are of no use.
+_HOPELESS = 2.0
 
 
 @dataclass(frozen=True)
@@ -271,7 +273,7 @@ class _Task:
             except GSOError as error:
                 failed = error
             else:
-                if tried[-1].ended or tried[-1].holds:
+                if tried[-1].ended or tried[-1].holds or self._out_of_reach(tried[-1]):
                     break
         if failed is not None and not tried:
             raise failed
@@ -287,6 +289,11 @@ class _Task:
         # may still be developable enough for strips.
         yield lambda: _without_darts(found_pieces(light, asked, 1.0))
         yield lambda: found_pieces(light, asked, JOINT)
+
+    def _out_of_reach(self, pieces: _Tried) -> bool:
+        """Return whether pieces are so far away that others do not hold the distance either."""
+        allowed = self.request.max_deviation
+        return allowed is not None and pieces.far > _HOPELESS * allowed
 
     def _answer(self, tried: Sequence[_Tried]) -> Result:
         few = self.request.options.number is None

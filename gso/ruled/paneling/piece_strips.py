@@ -19,7 +19,7 @@ from gso.pipeline.component_results import renumber, worst_status
 from gso.result import Result, StripsResult
 from gso.ruled.fold_lines import Folds
 from gso.ruled.paneling.light_design import LightDesign
-from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest, silent
 from gso.ruled.paneling.surface_strips import check_whole, of_surface, wanted
 from gso.ruled.ruled_surface import RuledSurface
@@ -144,15 +144,27 @@ def _candidates(
     A piece is developable, so that one strip should do; more of them are more parts. Strips that
     follow their piece closely come first, as the sides of their seams fit.
     """
-    left, most = _distance_left(joint, request, light), min(request.options.max_strips, _STRIPS)
-    if light.allowed is None or not request.may_leave_pieces:
-        yield _of_each(joint.shape, request, most, left), False
+    allowed, options, design = light.allowed, request.options, joint.design
+    most, near = min(options.max_strips, _STRIPS), _NEAR * design.diagonal
+    if allowed is None:
+        yield _of_each(joint.shape, request, most, None if options.number else near), False
         return
-    # Numbers and distances may be the same.
-    for number, follow in dict.fromkeys([(1, _LEAST * light.allowed), (1, left), (most, left)]):
-        strips = _of_each(joint.shape, request, number, follow)
-        if follow == left:
+    left = allowed - metrics.largest_distance(light.mesh, joint.shape.design)
+    follow = float(np.clip(left, _LEAST * allowed, _MOST * allowed))
+    if not request.may_leave_pieces:
+        yield _of_each(joint.shape, request, most, follow), False
+        return
+    # No strips hold the distance near pieces that are much farther away themselves.
+    hopeless = left < -_MOST * allowed
+    single = _of_each(joint.shape, request, 1, follow)
+    for near in dict.fromkeys([follow] if hopeless else [_LEAST * allowed, follow]):
+        strips = [_within(made, near, options) for made in single]
+        if near == follow:
             yield strips, False
+        yield strips, True
+    if most > 1 and not hopeless:
+        strips = _of_each(joint.shape, request, most, follow, single)
+        yield strips, False
         yield strips, True
 
 
@@ -192,37 +204,44 @@ def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> _
     return _Joint(light.design, division if result.pieces is None else result.pieces, result, ())
 
 
-def _distance_left(joint: _Joint, request: StripsRequest, light: LightDesign) -> float | None:
-    """Return the distance within which strips follow the pieces; None for any."""
-    allowed = light.allowed
-    if allowed is None:
-        return None if request.options.number else _NEAR * joint.design.diagonal
-    left = allowed - metrics.largest_distance(light.mesh, joint.shape.design)
-    return float(np.clip(left, _LEAST * allowed, _MOST * allowed))
+def _within(made: Result | GSOError, follow: float, options: Options) -> Result | GSOError:
+    """Return strips with the status that they have within a distance of their piece."""
+    if not isinstance(made, StripsResult) or made.status is Status.CANCELLED:
+        return made
+    met = wanted(options, follow, 1.0).met(made.ruled)
+    return replace(made, status=Status.CONVERGED if met else Status.TARGET_MISSED)
 
 
 def _of_each(
-    shape: Pieces, request: StripsRequest, most: int, follow: float | None
+    shape: Pieces,
+    request: StripsRequest,
+    most: int,
+    follow: float | None,
+    fewer: Sequence[Result | GSOError] = (),
 ) -> list[Result | GSOError]:
-    """Make strips of each piece, at most so many."""
+    """Make strips of each piece, at most so many; `fewer`, which are kept where they follow it."""
     # Their own normals give the rulings of developable pieces.
     options = replace(request.options, starts=("design",), max_strips=most)
     own = replace(request, options=options, constraints=(), start=Start(None))
-    meshes = [piece.mesh for piece in shape]
-    if request.callback is not None or len(meshes) < _MANY:
-        out = []
-        for number, mesh in enumerate(meshes):
-            request.say(f"strips of piece {number + 1} of {len(meshes)}")
-            told = _numbered(request.callback, number, len(meshes))
-            out.append(_strips(replace(own, callback=told), follow, mesh))
-        return out
+    found: dict[int, Result | GSOError] = {
+        number: made
+        for number, made in enumerate(fewer)
+        if isinstance(made, Result) and made.status is Status.CONVERGED
+    }
+    count = len(shape)
+    missing = [number for number in range(count) if number not in found]
+    if request.callback is not None or len(missing) < _MANY:
+        for number in missing:
+            request.say(f"strips of piece {number + 1} of {count}")
+            told = _numbered(request.callback, number, count)
+            found[number] = _strips(replace(own, callback=told), follow, shape[number].mesh)
+        return [found[number] for number in range(count)]
     work = partial(_strips, replace(own, say=silent), follow)
-    found: dict[int, Result | GSOError] = {}
     with open_executor(request.workers) as executor:
-        for done in executor.as_completed(work, meshes):
-            found[done.index] = done.result or MeshError(str(done.error))
-            request.say(f"strips of piece {len(found)} of {len(meshes)}")
-    return [found[k] for k in range(len(meshes))]
+        for done in executor.as_completed(work, [shape[number].mesh for number in missing]):
+            found[missing[done.index]] = done.result or MeshError(str(done.error))
+            request.say(f"strips of piece {len(found)} of {count}")
+    return [found[number] for number in range(count)]
 
 
 def _strips(request: StripsRequest, follow: float | None, mesh: Mesh) -> Result | GSOError:
