@@ -39,13 +39,13 @@ def edges_along(points: Array, edges: Ints, lines: Sequence[Array]) -> tuple[Int
     >>> along.tolist(), notes[0][:43]
     ([[2, 0]], 'polyline 1 does not run along edges between')
     """
-    # Looking for closest points takes an import that few files need.
-    from scipy.spatial import cKDTree
-
     segments = [(k, *ends) for k, line in enumerate(lines) for ends in pairwise(line)]
     found, notes = [np.empty((0, 2), np.int64)], list[str]()
     if not segments:
         return found[0], notes
+    # An import that few files need.
+    from scipy.spatial import cKDTree
+
     a, b = points[edges].transpose(1, 0, 2)
     near = _NEAR * float(np.linalg.norm(np.ptp(np.concatenate([a, b]), axis=0)))
     tree, long = cKDTree(0.5 * (a + b)), 0.5 * float(np.linalg.norm(b - a, axis=1).max())

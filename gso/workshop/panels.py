@@ -189,15 +189,20 @@ class Made:
             parts = (panel.surface.vertices, panel.surface.faces, panel.flat)
             every = (*parts, panel.bends, panel.angles, panel.radii, panel.zone)
             out |= {f"panel{k}_{name}": x for name, x in zip(_ARRAYS, every, strict=True)}
-        for k, seam in enumerate(self.matings):
-            out[f"seam{k}_along"] = seam.along
-            out[f"seam{k}_number"] = np.array(seam.number)
-            out[f"seam{k}_common"] = np.array(int(seam.common))
-            out[f"seam{k}_angle"] = np.array(seam.angle)
-            for name, side in (("one", seam.one), ("two", seam.two)):
-                out[f"seam{k}_{name}_edges"] = side.edges
-                out[f"seam{k}_{name}_shares"] = side.shares
-                out[f"seam{k}_{name}_panel"] = np.array(side.panel)
+        # Few arrays for many seams: a file takes time for each.
+        seams = self.matings
+        sides = [(seam.one, seam.two) for seam in seams]
+        out["seam_count"] = np.array([len(seam.along) for seam in seams], np.int64)
+        out["seam_along"] = np.concatenate([np.empty(0), *(seam.along for seam in seams)])
+        out["seam_number"] = np.array([seam.number for seam in seams], np.int64)
+        out["seam_common"] = np.array([int(seam.common) for seam in seams], np.int64)
+        out["seam_angle"] = np.array([seam.angle for seam in seams], float)
+        for k, name in enumerate(("one", "two")):
+            own = [pair[k] for pair in sides]
+            none = np.empty((0, 2), np.int64)
+            out[f"seam_{name}_edges"] = np.concatenate([none, *(side.edges for side in own)])
+            out[f"seam_{name}_shares"] = np.concatenate([none[:, 0], *(x.shares for x in own)])
+            out[f"seam_{name}_panel"] = np.array([side.panel for side in own], np.int64)
         return out
 
     @classmethod
@@ -212,27 +217,37 @@ class Made:
         try:
             panels = []
             for k, (own, zones, faces) in enumerate(json.loads(data["names"].tobytes())):
-                points, table, flat, bends, angles, radii, zone = (
+                points, table, flat, bends, turns, radii, zone = (
                     data[f"panel{k}_{part}"] for part in _ARRAYS
                 )
                 surface = Mesh(points, table)
                 known = tuple(Zone(*row) for row in zones)
-                lines = (bends, angles, radii, zone, known)
+                lines = (bends, turns, radii, zone, known)
                 panels.append(Panel(str(own), surface, flat, *lines, tuple(faces)))
-            matings: list[Mating] = []
-            while f"seam{len(matings)}_along" in data:
-                k = len(matings)
-                one, two = (
-                    Side(
-                        int(data[f"seam{k}_{side}_panel"]),
-                        data[f"seam{k}_{side}_edges"],
-                        data[f"seam{k}_{side}_shares"],
-                    )
-                    for side in ("one", "two")
+            stops = np.cumsum(data["seam_count"])[:-1]
+            numbers, common, angles = (
+                data[f"seam_{part}"].tolist() for part in ("number", "common", "angle")
+            )
+            both = [
+                map(
+                    Side,
+                    data[f"seam_{side}_panel"].tolist(),
+                    np.split(data[f"seam_{side}_edges"], stops),
+                    np.split(data[f"seam_{side}_shares"], stops),
                 )
-                number, common = int(data[f"seam{k}_number"]), bool(data[f"seam{k}_common"])
-                angle = float(data[f"seam{k}_angle"])
-                matings.append(Mating(number, data[f"seam{k}_along"], one, two, common, angle))
+                for side in ("one", "two")
+            ]
+            matings = [
+                Mating(number, along, one, two, bool(is_common), angle)
+                for number, along, one, two, is_common, angle in zip(
+                    numbers,
+                    np.split(data["seam_along"], stops),
+                    *both,
+                    common,
+                    angles,
+                    strict=False,
+                )
+            ]
         except (KeyError, ValueError, TypeError) as error:
             raise MeshError(f"the arrays of {name} do not fit each other: {error}") from None
         return cls(name, tuple(panels), tuple(matings), record)
