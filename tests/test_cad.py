@@ -13,7 +13,7 @@ from scipy.special import ellipe
 import gso
 from gso import Mesh, io, recognition
 from gso.mesh import Labels
-from gso.workshop import Finish
+from gso.workshop import Finish, Thickness
 
 pytest.importorskip("OCP", exc_type=ImportError)
 
@@ -374,8 +374,6 @@ class TestSheetMetal:
             made(saved(shape, tmp_path / "a.step"))
 
     def test_another_thickness_or_unit_is_refused(self, tmp_path):
-        from gso.workshop import Thickness
-
         path = saved(bracket(), tmp_path / "a.step")
         with pytest.raises(gso.OptionError, match="2 mm thick, not 3 mm"):
             made(path, thickness=Thickness(3.0))
@@ -450,8 +448,6 @@ class TestFoldedSolids:
         )
 
     def test_a_box_of_sheets_has_the_thickness_asked_for(self, tmp_path):
-        from gso.workshop import Thickness
-
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")
         done = made(path, step=True, thickness=Thickness(1.0, face="inside"))
         found = mass(done.folder / "folded.step")
@@ -466,8 +462,6 @@ class TestFoldedSolids:
 
     @pytest.mark.parametrize("slope", [0.0, 0.3])
     def test_tubes_and_cones_are_round(self, tmp_path, slope):
-        from gso.workshop import Thickness
-
         t, z = np.meshgrid(np.linspace(0, 2 * np.pi, 37), [0.0, 30.0, 60.0])
         r = 20 + slope * z
         grid = np.stack([r * np.cos(t), r * np.sin(t), z], axis=-1)
@@ -483,6 +477,18 @@ class TestFoldedSolids:
         side = 60.0 * np.hypot(1.0, slope)
         volume = 2 * np.pi * (20 + 30 * slope) * 2.0 * side
         assert mass(done.folder / "folded.step") == pytest.approx(volume, rel=1e-9)
+
+    @pytest.mark.parametrize("mitre", [0.0, 0.4])
+    def test_facets_of_round_faces_are_named(self, tmp_path, mitre):
+        t, z = np.meshgrid(np.linspace(0, np.pi, 19), [0.0, 30.0, 60.0])
+        x = 20 * np.cos(t)
+        grid = np.stack([x, 20 * np.sin(t), z * (1 + mitre * x / 60)], axis=-1)
+        finish = Finish(**BARE, thickness=Thickness(1.0))
+        done = gso.fabricate(grid, tmp_path, finish=finish, workers=0, formats=("svg",), step=True)
+        said = [note for note in done.certificate["notes"] if "facets" in note]
+        assert len(said) == (mitre > 0) and all("part design has" in note for note in said)
+        # The round face is as large as the solid says, or the facets are within 1 % of it.
+        assert mass(tmp_path / "folded.step") == pytest.approx(20 * np.pi * 60, rel=1e-2)
 
     def test_a_design_without_thickness_is_refused(self, tmp_path):
         path = saved(box((0, 0, 0), (100, 60, 40)), tmp_path / "a.step")

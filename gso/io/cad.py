@@ -48,13 +48,15 @@ class Turned(NamedTuple):
 class Solid(NamedTuple):
     """A solid with a name: a closed mesh, and what is round in it.
 
-    The faces `turned` take the place of the triangles that are not among `kept` (k,).
+    The faces `turned` take the place of the triangles that are not among `kept` (k,). With
+    `faceted`, some triangles are facets of a round surface.
     """
 
     name: str
     mesh: Mesh
     turned: Sequence[Turned] = ()
     kept: Ints | None = None
+    faceted: bool = False
 
 
 SPLINE_SUFFIXES = tuple(_KITS)

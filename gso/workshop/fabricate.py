@@ -26,13 +26,14 @@ from gso.quantities import (
 )
 from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
+from gso.wording import places
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.designs import Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.job_folder import CERTIFICATE, WORK, opened, path_of
+from gso.workshop.job_folder import CERTIFICATE, SOLIDS, WORK, opened, path_of
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
@@ -305,6 +306,11 @@ def fabricate(
         records.append(record)
         reasons += [reason.within(one.name) for reason in why]
         of_sheet.setdefault(thick, []).extend(own)
+    if faceted := [solid.name for solid in solids if solid.faceted]:
+        notes.append(
+            f"{SOLIDS}: {places('part', faceted)} {'has' if len(faceted) == 1 else 'have'} flat "
+            "facets in place of round faces that do not end at rulings and circles"
+        )
     parts: list[Part] = []
     same: dict[str, str] = {}
     for some in of_sheet.values():

@@ -78,7 +78,8 @@ def thick(surface: Mesh, below: float, sheet: float, name: str = "part") -> Soli
     edges, outline = np.stack([he.origin, he.dest], axis=1), np.flatnonzero(he.twin < 0)
     flat, straight = np.ones(len(triangles), bool), np.ones(len(outline), bool)
     turned: list[Turned] = []
-    for bend, ids in _bends(surface):
+    bends, faceted = _bends(surface)
+    for bend, ids in bends:
         exact = bend.normals(points[triangles[ids]].reshape(-1, 3)).reshape(-1, 3, 3)
         side = float(np.sign(np.einsum("tcd,tcd->", exact, normals[ids])))
         mine = np.isin(np.arange(len(triangles)), ids)
@@ -92,6 +93,7 @@ def thick(surface: Mesh, below: float, sheet: float, name: str = "part") -> Soli
             most = np.inf if found[0].angle == 2 * np.pi else _SAME * surface.diagonal
             straight &= ~mine[he.face[outline]] | (rise > most)
             turned += found
+        faceted |= not found
     way = _mitres(triangles, normals, len(points))
     n = len(points)
     a, b = he.origin[outline], he.dest[outline]
@@ -101,16 +103,18 @@ def thick(surface: Mesh, below: float, sheet: float, name: str = "part") -> Soli
         np.concatenate([triangles, triangles[:, ::-1] + n, walls]),
     )
     kept = np.flatnonzero(np.concatenate([flat, flat, straight, straight]))
-    return Solid(name, solid, tuple(turned), kept if turned else None)
+    return Solid(name, solid, tuple(turned), kept if turned else None, faceted)
 
 
-def _bends(surface: Mesh) -> list[tuple[RoundSurface, Ints]]:
-    """Return the cylinders and cones of a surface, with their triangles."""
+def _bends(surface: Mesh) -> tuple[list[tuple[RoundSurface, Ints]], bool]:
+    """Return the cylinders and cones of a surface with their triangles, and if others are round."""
     shape = recognise(surface)
     if len(shape.triangles) != len(surface.triangles):
         # A closed face was opened.
-        return []
-    return [(face.surface, face.triangles) for face in shape.faces if face.surface is not None]
+        return [], True
+    bends = [(face.surface, face.triangles) for face in shape.faces if face.surface is not None]
+    others = (face for face in shape.faces if face.surface is None)
+    return bends, any(face.kind in ("cone", "torsal") for face in others)
 
 
 def _turned(
