@@ -141,6 +141,20 @@ def test_strips_without_room_are_refused(tmp_path, design, options):
     assert [reason.code.value for reason in job.reasons] == ["seam_strip"]
 
 
+def test_seams_without_tabs_are_named(tmp_path):
+    # The walls of a rod are narrower than a quarter of the tabs, along its only long seam.
+    rod = box(200.0, 3.0, 3.0)
+    job = made(rod, tmp_path / "a", tabs=40.0)
+    assert job.usable
+    said = "seam 1 has no tab"
+    assert [said in note for note in job.certificate["notes"]].count(True) == 1
+    gso.save(rod, tmp_path / "rod.obj")
+    command = ["unfold", str(tmp_path / "rod.obj"), "-o", str(tmp_path / "rod.svg"), "--tabs"]
+    runner = CliRunner()
+    assert f"note: {said}" in runner.invoke(main, [*command, "40"]).output
+    assert "no tab" not in runner.invoke(main, [*command, "2"]).output
+
+
 def test_other_seams_and_options(tmp_path):
     square = duct([(0, 0), (60, 0), (60, 60), (0, 60)])
     job = made(square, tmp_path / "a", seam_overlap=5.0)
