@@ -54,6 +54,8 @@ def test_a_tube_is_wider_by_its_overlap(tmp_path, width):
     whole = 2 * np.pi * radius + width
     np.testing.assert_allclose(part.size, (whole, length), rtol=1e-9)
     assert part.area == pytest.approx(whole * length, rel=1e-9)
+    over = part.mirrored()
+    assert [zone.angle for zone in over.zones] == [-zone.angle for zone in part.zones]
     (seam,) = part.seams
     at = seam[0, 0]
     assert at == pytest.approx(seam[1, 0]) and min(at, whole - at) == pytest.approx(width)

@@ -372,15 +372,16 @@ def fabricate(
 def _other_seams(made: Made, finish: Finish) -> list[str]:
     """Say where no seam is of the kind that strips along seams are asked for."""
     smooth = [abs(seam.angle) <= SMOOTH for seam in made.matings]
-    kinds = (
-        (finish.seam_overlap, any(smooth), "smooth", "overlap"),
-        (finish.seam_flange, not all(smooth), "at an angle", "flange"),
-    )
-    return [
-        f"no seam is {kind}, so that none has {'an' if what == 'overlap' else 'a'} {what}"
-        for width, found, kind, what in kinds
-        if width and not found
-    ]
+    if (finish.seam_overlap and any(smooth)) or (finish.seam_flange and not all(smooth)):
+        return []
+    if (finish.seam_overlap and finish.seam_flange) or not smooth:
+        return ["there is no seam, so that there is no overlap or flange"]
+    if finish.seam_overlap:
+        return [
+            "no seam is smooth, so that none has an overlap; --seam-flange is for seams with "
+            "an angle"
+        ]
+    return ["no seam has an angle, so that none has a flange; --seam-overlap is for smooth seams"]
 
 
 def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:
