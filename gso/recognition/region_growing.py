@@ -130,6 +130,8 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
         open_facets &= np.bincount(graph.facet) > 1
     order = order[open_facets[order] & small[order]][:_SEEDS]
     tried, failures = np.zeros(table.shape[0], bool), 0
+    # Facets of a fan have the same ones around them.
+    failed: set[bytes] = set()
     first = np.zeros(table.shape[0], np.int64)
     first[graph.facet[::-1]] = np.arange(len(graph.facet))[::-1]
     for start in range(0, len(order), _TOGETHER):
@@ -145,12 +147,15 @@ def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = Fal
                 continue
             facets = around.indices[around.indptr[k] : around.indptr[k + 1]]
             seed = free & np.isin(graph.facet, facets)
-            region = _best(graph, seed, free, tried, axes[k])
+            key = np.packbits(seed).tobytes()
+            region = None if key in failed else _best(graph, seed, free, tried, axes[k])
             if region is None:
                 failures += 1
+                failed.add(key)
                 continue
             found.append(region)
             free &= ~region.member
+            failed.clear()
     return found
 
 
