@@ -427,7 +427,7 @@ def radius_of(job):
 
 SHEET = {"finish": Finish(thickness=Thickness(1.5, k=0.5, radius=2.0))}
 L, U, OPEN = ((50, 50), (90,)), ((40, 60, 40), (90, 90)), ((70, 30), (45,))
-#: Cells of 15 openings in a plate, three at each end of its bend, slots of half a tube, and its length.
+#: Cells of 15 openings in a plate, on its bend and beside it; slots of half a tube, and its length.
 CELLS = [
     (i + a, j + b)
     for i in (3, 9, 15)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
 
 from gso.geometry.polygon import rectangle
+from gso.mesh.topology import edge_graph
 from gso.typing import Array, Ints
 from gso.unfolding.canonical_order import classes
 from gso.unfolding.layout import Layout
@@ -88,6 +88,7 @@ class _Search:
     def __init__(self, layout: Layout, random: np.random.Generator):
         self.now, self.best = layout, layout
         self.random = random
+        self.tree: _Tree | None = None
         self.around = layout.links.around()
         self.mean = float(layout.links.weights.mean())
 
@@ -173,9 +174,8 @@ class _Search:
 
     def _turned(self, edge: int) -> Layout | None:
         """Join a part along another edge; it is cut along one between both sides of it."""
-        path = _path(self.now, self.around, edge)
-        if not path:
-            return None
+        self.tree = _Tree.of(self.now, self.tree)
+        path = self.tree.path(edge)
         return exchanged(self.now, self.around, edge, path[int(self.random.integers(len(path)))])
 
     def _below(self, layout: Layout, root: int, blocked: Ints) -> list[list[int]]:
@@ -221,22 +221,44 @@ class _Search:
                 return
 
 
-def _path(layout: Layout, around: list[list[tuple[int, int]]], edge: int) -> list[int]:
-    """Return the joined edges between both sides of an edge of one part."""
-    start, end = layout.links.patches[edge].tolist()
-    by = {start: (-1, -1)}
-    queue = deque([start])
-    while queue and end not in by:
-        here = queue.popleft()
-        for step, there in around[here]:
-            if layout.joined[step] and there not in by:
-                by[there] = (step, here)
-                queue.append(there)
-    path = []
-    while end in by and by[end][0] >= 0:
-        path.append(by[end][0])
-        end = by[end][1]
-    return path
+class _Tree:
+    """Paths along joined edges; patches are ordered so that those above others come first."""
+
+    def __init__(self, layout: Layout):
+        from scipy.sparse.csgraph import breadth_first_order
+
+        self.layout, count = layout, layout.links.count
+        joined = np.flatnonzero(layout.joined)
+        a, b = layout.links.patches[joined].T
+        # One patch of each part is below a common root.
+        first = np.unique(layout.part, return_index=True)[1]
+        root = np.full(len(first), count)
+        graph = edge_graph(count + 1, np.r_[a, b, root], np.r_[b, a, first])
+        order, above = breadth_first_order(graph, count)
+        place = np.empty(count + 1, np.int64)
+        place[order] = np.arange(len(order))
+        by = np.full(count + 1, -1)
+        by[np.where(above[a] == b, a, b)] = joined
+        self.above, self.place, self.by = above.tolist(), place.tolist(), by.tolist()
+
+    @classmethod
+    def of(cls, layout: Layout, known: _Tree | None) -> _Tree:
+        """Return the tree of a layout, which may be known."""
+        return known if known is not None and known.layout is layout else cls(layout)
+
+    def path(self, edge: int) -> list[int]:
+        """Return the joined edges between both sides of an edge of one part."""
+        start, end = self.layout.links.patches[edge].tolist()
+        back: list[int] = []
+        path: list[int] = []
+        while start != end:
+            if self.place[end] > self.place[start]:
+                path.append(self.by[end])
+                end = self.above[end]
+            else:
+                back.append(self.by[start])
+                start = self.above[start]
+        return path + back[::-1]
 
 
 def exchanged(
@@ -246,11 +268,11 @@ def exchanged(
     links = layout.links
     new = layout.copy()
     new.joined[cut] = False
-    start = int(links.patches[edge, 1])
+    joined, start = new.joined.tolist(), int(links.patches[edge, 1])
     own, order = {start}, [start]
     for here in order:
         for step, there in around[here]:
-            if new.joined[step] and there not in own:
+            if joined[step] and there not in own:
                 own.add(there)
                 order.append(there)
     if int(links.patches[edge, 0]) in own:
@@ -265,6 +287,7 @@ def _shortened(layout: Layout, end: float) -> Layout:
     around = links.around()
     order = _longest(np.arange(len(links.weights)), links.weights)
     least = 1e-7 * float(links.weights.max(initial=0.0))
+    weights, tree = links.weights.tolist(), None
     for _ in range(_PASSES):
         before = layout
         shortest = float(links.weights[layout.joined].min(initial=np.inf))
@@ -274,10 +297,8 @@ def _shortened(layout: Layout, end: float) -> Layout:
                 continue
             if layout.work[0] > end:
                 return layout
-            path = _path(layout, around, edge)
-            if not path:
-                continue
-            cut = min(path, key=lambda step: links.weights[step])
+            tree = _Tree.of(layout, tree)
+            cut = min(tree.path(edge), key=weights.__getitem__)
             if links.weights[cut] < links.weights[edge] - least:
                 layout = exchanged(layout, around, edge, cut) or layout
         if layout is before:
@@ -292,13 +313,15 @@ def _compacted(layout: Layout, end: float) -> Layout:
     size = [_rectangle(layout, part) for part in range(int(layout.part.max()) + 1)]
     kind = classes(links.weights)
     order = _longest(np.flatnonzero(np.bincount(kind)[kind] > 1), links.weights)
+    tree = None
     for _ in range(_PASSES):
         before = layout
         for edge in order.tolist():
             a, b = layout.part[links.patches[edge]].tolist()
             if layout.joined[edge] or a != b:
                 continue
-            path = np.array(_path(layout, around, edge), np.int64)
+            tree = _Tree.of(layout, tree)
+            path = np.array(tree.path(edge), np.int64)
             for cut in path[kind[path] == kind[edge]].tolist():
                 layout.work[0] += _BOXED
                 if layout.work[0] > end:
