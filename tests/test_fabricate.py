@@ -212,6 +212,7 @@ class TestCommand:
         assert "page to look at" in done.output
         assert (tmp_path / "out" / "parts.pdf").stat().st_size > 0
         shutil.rmtree(tmp_path / "out")
+        gso.save(dome(5, 0.2), "dome.obj")
         most = ("--max-deviation", "1e-7", "--max-strips", "4")
         done = CliRunner().invoke(main, [*words.split(), *most])
         assert done.exit_code == 1
@@ -257,7 +258,7 @@ def test_groups_that_a_file_lacks_are_named(tmp_path):
 @pytest.mark.slow
 def test_a_design_larger_than_a_sheet_is_cut_to_fit(tmp_path):
     pytest.importorskip("spyrrow")
-    design = dome(17, 0.2)
+    design = dome(11, 0.2)
     job = gso.fabricate(
         design, tmp_path, unit="m", sheet=(1600.0, 1600.0), workers=0, formats=("svg",), seconds=2
     )

@@ -254,7 +254,7 @@ def test_many_mutated_files(start, originals, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", range(200, 3000, 400))
+@pytest.mark.parametrize("start", range(200, 3000, 800))
 def test_many_mutated_meshes(start):
     assert surfaces(range(start, start + 400)) > 120
 

@@ -7,7 +7,7 @@ from scipy.spatial import Delaunay
 from gso import Mesh, MeshError, OptionError
 from gso.smoothing import Smoothed, estimate_sigma, smooth_grid, smooth_mesh
 from gso.smoothing.local_fits import neighbours, residuals, rings, umbrella
-from gso.smoothing.select import best_weight, factor, gcv
+from gso.smoothing.select import best_weight, factoring, gcv
 from gso.smoothing.spectrum import CENTRE, Spectrum
 from tests.conftest import rotation
 
@@ -356,7 +356,7 @@ def test_the_weight_is_the_one_of_exact_cross_validation():
     exact = weights[np.argmin(np.log(removed**2 @ energy) - 2 * np.log(removed.sum(axis=1)))]
     choice = best_weight(penalty, dirty, 1e-6, gcv(1.0))
     assert abs(np.log10(choice.weight / exact)) < 0.5
-    expected = factor(penalty, choice.weight)(dirty)
+    expected = factoring(penalty)(choice.weight)(dirty)
     assert np.abs(choice.points - expected).max() < 1e-4
 
 

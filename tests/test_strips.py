@@ -21,7 +21,7 @@ from tests.test_pieces import ball, dome
 FAST = {"options": "fast"}
 
 
-def cap(count: int = 21) -> Mesh:
+def cap(count: int = 11) -> Mesh:
     """A dome that one strip does not follow within 2 % of its diagonal, and three do."""
     u, v = np.meshgrid(*[np.linspace(-1.0, 1.0, count)] * 2, indexing="ij")
     return gso.as_mesh(np.stack([u, v, 0.5 - 0.25 * (u * u + v * v)], axis=-1))

@@ -9,7 +9,7 @@ import numpy as np
 from gso.mesh import Mesh
 from gso.smoothing.base import Smoothed, checked_options, to_unit
 from gso.smoothing.local_fits import Residuals, Rings, neighbours, residuals, rings, umbrella
-from gso.smoothing.select import Choice, best_weight, factor, gcv, largest_weight, unbiased_risk
+from gso.smoothing.select import Choice, best_weight, factoring, gcv, largest_weight, unbiased_risk
 from gso.typing import Array
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _solve(
         return Choice(unit, 0.0, float(len(unit)))
     if weight is None:
         return best_weight(penalty, unit, start, unbiased_risk(sigma**2))
-    solve = factor(penalty, min(weight, largest_weight(penalty)))
+    solve = factoring(penalty)(min(weight, largest_weight(penalty)))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(unit), 3))
     dof = float((signs * solve(signs)).sum()) / signs.shape[1]
     return Choice(solve(unit), weight, dof)

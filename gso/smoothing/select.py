@@ -34,20 +34,20 @@ class Family:
 
     Parameters
     ----------
-    penalty : sparse matrix, (n, n)
-        Positive semidefinite K.
+    factor : callable
+        Returns a solver of I + w K for a weight w; see :func:`factoring`.
     points : ndarray, (n, 3)
         The data.
     shift : float
         Centre of the range of weights.
     """
 
-    def __init__(self, penalty: csc_matrix, points: Array, shift: float):
+    def __init__(self, factor: Callable[[float], Solve], points: Array, shift: float):
         count = len(points)
         signs = np.random.default_rng(0).choice([-1.0, 1.0], (count, PROBES))
         start = np.hstack([points, signs])
         length = np.linalg.norm(start, axis=0)
-        solve = factor(penalty, shift)
+        solve = factor(shift)
         vector, last = start / np.where(length > 0, length, 1.0), np.zeros_like(start)
         beta = np.zeros(start.shape[1])
         basis, diagonal, beside = [], [], []
@@ -114,8 +114,9 @@ def best_weight(penalty: csc_matrix, points: Array, start: float, criterion: Cri
     """Minimise a criterion of (sum of squared residuals, trace of I - H, n) over weights."""
     most = largest_weight(penalty)
     shift, low, high = min(start, most), 0.0, np.inf
+    factor = factoring(penalty)
     for _ in range(ROUNDS):
-        family = Family(penalty, points, shift)
+        family = Family(factor, points, shift)
         residual, trace = family.removed()
         score = criterion(residual, trace, len(points))
         # A shift from which the search went up becomes a lower bound, and conversely.
@@ -156,23 +157,32 @@ def unbiased_risk(variance: float) -> Criterion:
     return score
 
 
-def factor(penalty: csc_matrix, weight: float) -> Solve:
-    """Factorise I + weight K and return a solver for right-hand sides (n, c).
+def factoring(penalty: csc_matrix) -> Callable[[float], Solve]:
+    """Return a function that factorises I + weight K and returns a solver of sides (n, c).
 
     >>> from scipy.sparse import identity
-    >>> factor(identity(3), 1.0)(np.ones((3, 1))).ravel()
+    >>> factoring(identity(3))(1.0)(np.ones((3, 1))).ravel()
     array([0.5, 0.5, 0.5])
     """
-    from scipy.sparse import identity, tril
+    from scipy.sparse import coo_matrix, identity, tril
 
-    matrix = identity(penalty.shape[0]) + weight * penalty
-    lower = tril(matrix, format="csc")
+    count = penalty.shape[0]
+    half, k = tril(penalty, format="coo"), np.arange(count)
+    # All diagonal entries are stored, and come first in their columns.
+    values = np.r_[half.data, np.zeros(count)]
+    lower = coo_matrix((values, (np.r_[half.row, k], np.r_[half.col, k])), penalty.shape).tocsc()
     lower.sort_indices()
-    solver = choose(Pattern(lower.shape[0], lower.indptr, lower.indices))
-    try:
-        solver.factor(lower.data)
-    except SingularError:
-        # Indefinite by rounding, which an LU factorisation tolerates.
-        return spd(matrix)
-    solve: Callable[[Array], Array] = solver.solve
-    return solve
+    solver = choose(Pattern(count, lower.indptr, lower.indices))
+
+    def factored(weight: float) -> Solve:
+        data = weight * lower.data
+        data[lower.indptr[:-1]] += 1.0
+        try:
+            solver.factor(data)
+        except SingularError:
+            # Indefinite by rounding, which an LU factorisation tolerates.
+            return spd(identity(count) + weight * penalty)
+        solve: Solve = solver.solve
+        return solve
+
+    return factored
