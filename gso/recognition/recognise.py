@@ -68,11 +68,15 @@ def recognise(
     Notes
     -----
     A mesh is either a polyhedron with folds, or a smooth surface that is tessellated: facets are
-    one cylinder or cone if all their vertices lie on it, if at least three follow each other
+    one cylinder or cone if their vertices lie on it, if at least three follow each other
     around the axis, if half of the triangles span at most 30 degrees, and none more than 8 degrees
     and more than three times the upper quartile. Eight flat sides with folds of 45 degrees
     therefore stay folds, and twelve with 30 degrees are a tube. One row of facets between
     circles with smooth folds is no proof of straight rulings: a sphere consists of such rows.
+    Vertices of holes that were cut into the facets are inside the surface, by an error of chords at
+    most; their places in the plane are those of the nearest points of the surface. Triangles
+    across the ruling where a cylinder or cone is tangent to a plane or to a cylinder are divided
+    there.
     Faces of STEP and IGES files have the equations that the file gives them, if their vertices
     still lie on them.
 
