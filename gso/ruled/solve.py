@@ -212,7 +212,8 @@ class _Search:
             return False
         if count > _PAYING:
             share = max(share, np.sqrt(self._far(count) / self._far(count // 4)))
-        return self._far(count) * share ** np.log2(wanted.most / count) > wanted.max_deviation
+        least = self._far(count) * share ** np.log2(wanted.most / count)
+        return bool(least > wanted.max_deviation)
 
     def _bisect(self, job: Job, count: int) -> None:
         """Bisect between half a number of strips, which was too few, and that number."""
