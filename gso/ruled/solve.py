@@ -211,8 +211,9 @@ class _Search:
         if count < _TREND or wanted.max_deviation is None:
             return False
         if count > _PAYING:
-            share = max(share, np.sqrt(self._far(count) / self._far(count // 4)))
-        return self._far(count) * share ** np.log2(wanted.most / count) > wanted.max_deviation
+            share = max(share, float(np.sqrt(self._far(count) / self._far(count // 4))))
+        forecast = self._far(count) * share ** np.log2(wanted.most / count)
+        return bool(forecast > wanted.max_deviation)
 
     def _bisect(self, job: Job, count: int) -> None:
         """Bisect between half a number of strips, which was too few, and that number."""
