@@ -11,7 +11,6 @@ import pytest
 import gso
 from gso.exact import folded_pattern
 from gso.mesh import Mesh
-from gso.recognition import recognise
 from gso.verdict import Code
 from gso.workshop import Bend, Finish, Part, TabSeam, Thickness, with_tabs
 
@@ -483,7 +482,7 @@ def test_holes_do_not_divide_a_round_face(design, kinds, rounded):
         turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
         points = np.round(points @ turn.T * np.sign(np.linalg.det(turn)), 3)
     mesh = Mesh(points, faces)
-    shape = recognise(mesh)
+    shape = gso.recognition.recognise(mesh)
     assert sorted(face.kind for face in shape.faces) == kinds
     np.testing.assert_array_equal(shape.vertices[: len(mesh.vertices)], mesh.vertices)
     # Chords of the widest strip are up to 3 % longer or shorter than their arcs, within a strip.
