@@ -145,10 +145,20 @@ def solve(
         if conditions.mirror is not None:
             points = np.concatenate([points, conditions.mirror.image(points)])
         jobs.append(Job(target, points, tell=tell, conditions=conditions))
-    search = _Search(jobs, wanted)
+    # The nearest single strip need not be the one whose halves are the nearest.
+    alone = wanted.strips is not None and wanted.strips > 1
+    groups = [{name: normals} for name, normals in starts.items()] if alone else [starts]
+    searches = [_Search(jobs, wanted) for _ in groups]
     with contextlib.suppress(Stopped):
-        search.run(starts)
-    return search.best, {k: f.surface.farthest for k, f in search.results.items()}
+        for search, group in zip(searches, groups, strict=True):
+            search.run(group)
+    every = [search.best for search in searches if search.best is not None]
+    best = min(every, key=lambda f: (f.surface.strips != wanted.strips, f.order), default=None)
+    tried: dict[int, float] = {}
+    for search in searches:
+        for k, f in search.results.items():
+            tried[k] = min(f.surface.farthest, tried.get(k, np.inf))
+    return best, tried
 
 
 class _Search:
@@ -211,9 +221,9 @@ class _Search:
         if count < _TREND or wanted.max_deviation is None:
             return False
         if count > _PAYING:
-            share = max(share, np.sqrt(self._far(count) / self._far(count // 4)))
-        least = self._far(count) * share ** np.log2(wanted.most / count)
-        return bool(least > wanted.max_deviation)
+            share = max(share, float(np.sqrt(self._far(count) / self._far(count // 4))))
+        forecast = self._far(count) * share ** np.log2(wanted.most / count)
+        return bool(forecast > wanted.max_deviation)
 
     def _bisect(self, job: Job, count: int) -> None:
         """Bisect between half a number of strips, which was too few, and that number."""
