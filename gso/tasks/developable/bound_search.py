@@ -38,8 +38,6 @@ _USABLE = 2.0 * NEAR
 #: Factor on the elongation in a solve by isometry near the design: its iterations end before a
 #: boundary that has grown is short again.
 _BORDERS = 3.0
-#: Factors in turn on the weights of the distance in such solves.
-_HELD = (1.0, 10.0)
 
 
 def search(run: Runner, request: SearchRequest) -> Solution:
@@ -120,8 +118,8 @@ def near_design(
     First by the same formulation: where the result was not `strained` with the same weights, and
     then with those for results that are bounded. Then, for "isometry", by that of the surface it
     starts from, and else by "isometry", if the user did not name one and did not ask for a fast
-    solve: without a bound, with more weight on the distance, and with the bound. There are none
-    with constraints, B-splines or the settings of a reference.
+    solve, without the bound first. There are none with constraints, B-splines or the settings of a
+    reference.
     """
     options = request.options
     reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
@@ -137,29 +135,24 @@ def near_design(
         )
         factor = request.weight_factor / curvature
         yield replace(near.with_options(same), weight_factor=factor)
+    yield _with_borders(near)
     if isinstance(options, joint_isometry.Options):
-        yield from _near_by_isometry(near, options, _HELD[1:])
         yield replace(near.with_options(Options()), formulation="curvature")
         return
-    yield near
     other = _by_isometry(analysis, near)
     if other is not None and options.iterations >= Options().iterations:
-        yield from _near_by_isometry(other, joint_isometry.Options(), _HELD)
+        # Without bounds the solve comes closer to a minimum in as many iterations, and therefore to
+        # the same surface from a design and its copies.
+        yield _with_borders(replace(other, max_displacement=None))
+        yield _with_borders(other)
 
 
-def _near_by_isometry(
-    near: SearchRequest, options: joint_isometry.Options, held: tuple[float, ...]
-) -> Iterator[SearchRequest]:
-    """Yield requests by "isometry" that keep the lengths of boundaries and the place more.
-
-    Solves without bounds come closer to a minimum in as many iterations, and therefore to the
-    same surface from a design and its copies: the one with bounds is the last.
-    """
-    o = replace(options, w_elongation=_BORDERS * options.w_elongation)
-    for factor in held:
-        place = replace(o, w_place=factor * o.w_place, w_closest=factor * o.w_closest)
-        yield replace(near.with_options(place), max_displacement=None)
-    yield near.with_options(o)
+def _with_borders(request: SearchRequest) -> SearchRequest:
+    """Return a request that keeps the lengths of boundaries more, if it is one by isometry."""
+    options = request.options
+    if not isinstance(options, joint_isometry.Options):
+        return request
+    return request.with_options(replace(options, w_elongation=_BORDERS * options.w_elongation))
 
 
 def stay_within(

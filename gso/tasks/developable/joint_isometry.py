@@ -203,10 +203,12 @@ def plan(
         flat_image.layout_of(mesh, cut),
         start.ravel(),
         [*before, *stages],
-        # Over more stages rounding grows, and symmetric designs lose their symmetry: other solves
-        # than the one that was asked for have none.
+        # With bounds rounding grows over more stages, and symmetric designs lose their symmetry:
+        # other solves than the one that was asked for have none.
         further=hidden_curvature.further(mesh, options.developable_below, stages[-1], bent)
-        if spline is None and options.begin == "curvature" and request.formulation_given
+        if spline is None
+        and options.begin == "curvature"
+        and (request.formulation_given or request.max_displacement is None)
         else None,
         notes=opened.notes,
         finish=partial(flat_image.place, mesh, cut),
