@@ -242,6 +242,29 @@ class TestEquations:
         radii = [line.radius_start for line in face.bend_lines]
         assert radii[0] == pytest.approx(8.0) and max(radii) == pytest.approx(125.0, rel=0.01)
 
+    @pytest.mark.parametrize("kind", ["surface", "face"])
+    def test_faces_of_a_3dm_file_are_unrolled_from_their_equations(self, tmp_path, kind):
+        rhino3dm = pytest.importorskip("rhino3dm")
+        surface = rhino3dm.NurbsSurface.Create(3, True, 3, 2, 5, 2)
+        arc = zip([1, 1, 0, -1, -1], [0, 1, 1, 1, 0], [1, 0.5**0.5] * 3, strict=False)
+        for i, (x, y, w) in enumerate(arc):
+            for j in range(2):
+                surface.Points[i, j] = rhino3dm.Point4d(5 * w * x, 2 * w * y, 3 * w * j, w)
+        for row, knots in ((surface.KnotsU, [0, 0, 1, 1, 2, 2]), (surface.KnotsV, [0, 1])):
+            for k, knot in enumerate(knots):
+                row[k] = knot
+        model = rhino3dm.File3dm()
+        model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Centimeters
+        if kind == "surface":
+            model.Objects.AddSurface(surface)
+        else:
+            model.Objects.AddBrep(rhino3dm.Brep.CreateFromSurface(surface))
+        assert model.Write(str(tmp_path / "a.3dm"), 7)
+        (face,) = recognition.recognise(gso.load(tmp_path / "a.3dm", chord=1.0)).faces
+        size = np.sort(np.ptp(face.flat.reshape(-1, 2), axis=0))
+        np.testing.assert_allclose(size, [30.0, 100.0 * ellipe(1 - 0.16)], rtol=1e-7)
+        assert face.kind == "torsal" and face.bend_angle == pytest.approx(np.pi, abs=1e-9)
+
     def test_tangent_neighbours_are_one_part_without_a_fold(self, tmp_path):
         (part,) = made(saved(half_ellipse(30.0, -50.0, 50.0), tmp_path / "a.step")).parts
         np.testing.assert_allclose(part.size, [80 + 100.0 * ellipe(1 - 0.16), 30.0], rtol=1e-9)

@@ -286,7 +286,7 @@ def _plane_curve(points: Array) -> Geom2d_BSplineCurve:
     poles = collections.Array1_gp_Pnt2d(1, len(spline.c))
     for k, point in enumerate(spline.c.tolist(), 1):
         poles.SetValue(k, gp_Pnt2d(*point))
-    return Geom2d_BSplineCurve(poles, *_knots(spline.t), spline.k)
+    return Geom2d_BSplineCurve(poles, *knots_of(spline.t), spline.k)
 
 
 def _surface(spline: BSplineSurface) -> Geom_BSplineSurface:
@@ -295,11 +295,11 @@ def _surface(spline: BSplineSurface) -> Geom_BSplineSurface:
     for i, row in enumerate(spline.net.tolist(), 1):
         for j, point in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(*point))
-    (u, u_times), (v, v_times) = _knots(spline.knots_u), _knots(spline.knots_v)
+    (u, u_times), (v, v_times) = knots_of(spline.knots_u), knots_of(spline.knots_v)
     return Geom_BSplineSurface(poles, u, v, u_times, v_times, *spline.degrees)
 
 
-def _knots(every: Array) -> tuple[collections.Array1_double, collections.Array1_int]:
+def knots_of(every: Array) -> tuple[collections.Array1_double, collections.Array1_int]:
     """Return the different knots and their multiplicities as arrays of OpenCASCADE."""
     knots, times = np.unique(every, return_counts=True)
     out = collections.Array1_double(1, len(knots)), collections.Array1_int(1, len(knots))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import rhino3dm
 
 from gso.errors import MeshError
 from gso.io.raw_surface import Surface
-from gso.mesh import Mesh, topology
+from gso.mesh import GivenSurface, GivenSurfaces, Mesh, topology
 from gso.mesh.attributes import Attributes, Labels
 from gso.mesh.welding import collapse, near
 from gso.quantities import MILLIMETRES
@@ -105,6 +106,7 @@ def read(data: bytes, suffix: str, chord: float | None = None) -> Surface:
 
     Trimmed faces have the triangles that Rhino saved with them (its render meshes): rhino3dm makes
     none. Whole surfaces are divided evenly. Names of objects are labels "o", names of layers "g".
+    Where OpenCASCADE is installed, planes and developable surfaces are known by their equations.
 
     Parameters
     ----------
@@ -128,54 +130,105 @@ def read(data: bytes, suffix: str, chord: float | None = None) -> Surface:
         raise MeshError(f"its unit is {unit}; save it in millimetres")
     scale = MILLIMETRES[known[unit]]
     layers = {layer.Index: layer.FullPath for layer in model.Layers}
-    points: list[Array] = []
-    faces: list[Ints] = []
-    labels: tuple[list[str], list[str]] = ([], [])
-    of_face: list[Ints] = []
-    count = left_out = 0
+    bodies: list[_Body] = []
+    left_out = 0
     for number, thing in enumerate(model.Objects):
         name = thing.Attributes.Name or f"object {number}"
         found = list(_pieces(thing.Geometry, name, None if chord is None else chord / scale))
-        if not found:
-            left_out += 1
-            continue
-        own_points = scale * np.concatenate([p for p, _ in found])
-        starts = np.cumsum([0, *(len(p) for p, _ in found)])
-        own = np.concatenate(
-            [np.where(f < 0, -1, f + k) for (_, f), k in zip(found, starts, strict=False)]
-        )
-        size = float(np.linalg.norm(np.ptp(own_points, axis=0)))
-        done = collapse(own, near(own_points, _SAME * size, np.arange(len(own_points))))
-        points.append(own_points)
-        faces.append(np.where(done.faces < 0, -1, done.faces + count))
-        count += len(own_points)
-        of_face.append(np.full(len(done.faces), len(labels[0])))
-        labels[0].append(name)
-        labels[1].append(layers.get(thing.Attributes.LayerIndex, ""))
-    if not faces:
+        left_out += not found
+        if found:
+            bodies.append(_Body(name, layers.get(thing.Attributes.LayerIndex, ""), found))
+    if not bodies:
         raise MeshError("it has no surfaces and no meshes; curves and points are not read")
-    table, place, which = np.concatenate(faces), np.concatenate(points), np.concatenate(of_face)
-    used = np.unique(table[table >= 0])
-    compact = np.where(table < 0, -1, np.searchsorted(used, table))
-    attributes = Attributes(
-        labels={k: Labels(tuple(row), which) for k, row in zip(("o", "g"), labels, strict=True)}
-    )
     notes = (f"{left_out} objects without faces were left out",) if left_out else ()
-    if (compact[:, 3] < 0).all():
+    return _together(bodies, scale, notes)
+
+
+class _Piece(NamedTuple):
+    """Vertices and faces (m, 4) of a face, -1 in triangles; its surface and their parameters.
+
+    The surface is None for meshes, and the parameters are unknown in render meshes.
+    """
+
+    points: Array
+    faces: Ints
+    surface: rhino3dm.NurbsSurface | None = None
+    nodes: Array | None = None
+
+
+class _Body(NamedTuple):
+    """An object of the file with its name and that of its layer."""
+
+    name: str
+    layer: str
+    pieces: list[_Piece]
+
+
+def _together(bodies: Sequence[_Body], scale: float, notes: tuple[str, ...]) -> Surface:
+    """Return the faces of all bodies, whose vertices are joined in each."""
+    pieces = [piece for body in bodies for piece in body.pieces]
+    surfaces, images = _equations(pieces, scale)
+    tables = [piece.faces for piece in pieces]
+    if surfaces:
+        tables = [topology.triangulate(table, np.zeros(len(table), bool)) for table in tables]
+    starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
+    points = scale * np.concatenate([piece.points for piece in pieces])
+    faces = np.concatenate(
+        [np.where(t < 0, -1, t + k) for t, k in zip(tables, starts, strict=False)]
+    )
+    target, first = np.arange(len(points)), 0
+    for body in bodies:
+        own = slice(starts[first], starts[first := first + len(body.pieces)])
+        size = float(np.linalg.norm(np.ptp(points[own], axis=0)))
+        target[own] = target[own][near(points[own], _SAME * size, np.arange(own.stop - own.start))]
+    done = collapse(faces, target)
+    piece_of = np.repeat(np.arange(len(pieces)), [len(table) for table in tables])[done.kept]
+    body_of = np.repeat(np.arange(len(bodies)), [len(body.pieces) for body in bodies])[piece_of]
+    used, corners = np.unique(done.faces, return_inverse=True)
+    compact = corners.reshape(done.faces.shape)
+    if used[0] < 0:
+        used, compact = used[1:], compact - 1
+    rows = ("o", [body.name for body in bodies]), ("g", [body.layer for body in bodies])
+    known = None
+    if surfaces:
+        # A triangle that is kept has its corners in the same order.
+        image = np.concatenate(images)[faces[done.kept]]
+        known = GivenSurfaces(surfaces, piece_of, image[..., :2], image[..., 2:])
+    labels = {kind: Labels(tuple(row), body_of) for kind, row in rows}
+    if len(compact.T) > 3 and (compact[:, 3] < 0).all():
         compact = compact[:, :3]
-    return Surface(place[used], compact, notes, attributes)
+    return Surface(points[used], compact, notes, Attributes(labels=labels, surfaces=known))
 
 
-def _pieces(
-    thing: rhino3dm.GeometryBase, name: str, chord: float | None
-) -> Iterator[tuple[Array, Ints]]:
-    """Yield vertices and faces (m, 4) of the faces of an object, -1 in triangles."""
+def _equations(
+    pieces: Sequence[_Piece], scale: float
+) -> tuple[tuple[GivenSurface, ...], list[Array]]:
+    """Return the surfaces of faces, and their images (n, 5); none if none can be unrolled."""
+    try:
+        from gso.io.rhino_surfaces import surface_of_face
+    except ImportError:
+        # Without OpenCASCADE surfaces are found in the triangles.
+        return (), []
+    surfaces, images = [], []
+    for number, piece in enumerate(pieces):
+        known, image = GivenSurface(f"face {number}", "surface"), None
+        if piece.surface is not None:
+            points = scale * piece.points
+            known, image = surface_of_face(piece.surface, number, points, piece.nodes, scale)
+        surfaces.append(known)
+        images.append(np.full((len(piece.points), 5), np.nan) if image is None else image)
+    unrolled = any(surface.rulings is not None for surface in surfaces)
+    return (tuple(surfaces), images) if unrolled else ((), [])
+
+
+def _pieces(thing: rhino3dm.GeometryBase, name: str, chord: float | None) -> Iterator[_Piece]:
+    """Yield the faces of an object."""
     if isinstance(thing, rhino3dm.Mesh):
-        yield _of_mesh(thing)
+        yield _Piece(*_of_mesh(thing))
     elif isinstance(thing, rhino3dm.Extrusion):
         mesh = thing.GetMesh(rhino3dm.MeshType.Any)
         if mesh is not None:
-            yield _of_mesh(mesh)
+            yield _Piece(*_of_mesh(mesh))
         else:
             yield from _pieces(thing.ToBrep(True), name, chord)
     elif isinstance(thing, rhino3dm.Brep):
@@ -183,17 +236,18 @@ def _pieces(
         for k in range(len(thing.Faces)):
             face = thing.Faces[k]
             mesh = face.GetMesh(rhino3dm.MeshType.Any)
+            surface = face.UnderlyingSurface().ToNurbsSurface()
             if mesh is not None and len(mesh.Faces):
-                yield _of_mesh(mesh)
+                yield _Piece(*_of_mesh(mesh), surface)
             elif whole:
-                yield _of_surface(face, chord)
+                yield _of_surface(surface, chord)
             else:
                 raise MeshError(
                     f"face {k} of {name} is trimmed and has no render mesh; in Rhino, shade the "
                     "model before saving it and do not save it small, or export it as STEP"
                 )
     elif isinstance(thing, rhino3dm.Surface):
-        yield _of_surface(thing, chord)
+        yield _of_surface(thing.ToNurbsSurface(), chord)
 
 
 def _of_mesh(mesh: rhino3dm.Mesh) -> tuple[Array, Ints]:
@@ -204,7 +258,7 @@ def _of_mesh(mesh: rhino3dm.Mesh) -> tuple[Array, Ints]:
     return np.array([[p.X, p.Y, p.Z] for p in points]).reshape(-1, 3), faces
 
 
-def _of_surface(surface: rhino3dm.Surface, chord: float | None) -> tuple[Array, Ints]:
+def _of_surface(surface: rhino3dm.NurbsSurface, chord: float | None) -> _Piece:
     """Divide a whole surface evenly in both directions, within a chord tolerance."""
     divisions = [1, 1]
     grid = _grid(surface, divisions)
@@ -222,15 +276,23 @@ def _of_surface(surface: rhino3dm.Surface, chord: float | None) -> tuple[Array, 
             if off.max() <= allowed:
                 break
             divisions = finer
-    grid = _grid(surface, divisions)
+    grid, nodes = (
+        _grid(surface, divisions),
+        np.stack(np.meshgrid(*_parameters(surface, divisions), indexing="ij"), axis=-1),
+    )
     n, m = grid.shape[:2]
     index = np.arange(n * m).reshape(n, m)
     corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
-    return grid.reshape(-1, 3), np.stack(corners, axis=-1).reshape(-1, 4)
+    faces = np.stack(corners, axis=-1).reshape(-1, 4)
+    return _Piece(grid.reshape(-1, 3), faces, surface, nodes.reshape(-1, 2))
 
 
-def _grid(surface: rhino3dm.Surface, divisions: Sequence[int]) -> Array:
+def _parameters(surface: rhino3dm.NurbsSurface, divisions: Sequence[int]) -> list[Array]:
     domains = [surface.Domain(k) for k in (0, 1)]
-    rows = [np.linspace(d.T0, d.T1, n + 1) for d, n in zip(domains, divisions, strict=True)]
+    return [np.linspace(d.T0, d.T1, n + 1) for d, n in zip(domains, divisions, strict=True)]
+
+
+def _grid(surface: rhino3dm.NurbsSurface, divisions: Sequence[int]) -> Array:
+    rows = _parameters(surface, divisions)
     places = [[surface.PointAt(u, v) for v in rows[1].tolist()] for u in rows[0].tolist()]
     return np.array([[[p.X, p.Y, p.Z] for p in row] for row in places])
