@@ -308,6 +308,21 @@ def test_kept_designs_are_written_and_read(tmp_path):
     assert drawing.count("90 degrees") == 4
 
 
+def test_nearly_developable_designs_are_kept_with_a_note(tmp_path):
+    design = half_cylinder(shape=(41, 21))
+    noise = np.random.default_rng(0).normal(size=design.vertices.shape)
+    noise *= 1e-4 * design.size / np.linalg.norm(noise, axis=1).max()
+    noisy = design.replaced(design.vertices + noise)
+    found = gso.pieces(noisy)
+    (note,) = [note for note in found.notes if "nothing was moved" in note]
+    assert "nearly developable" in note and 1e-5 < found.metrics["strain_max"] < 1e-3
+    done = gso.fabricate(noisy, tmp_path / "job")
+    assert any(note.endswith("at most") for note in done.certificate["notes"])
+    assert len(done.parts) == 1 and done.certificate["designs"][0]["deviation_max"] == 0.0
+    (note,) = [note for note in gso.pieces(design).notes if "nothing was moved" in note]
+    assert "is developable as it is" in note
+
+
 def bulged_box(x=100.0, y=80.0, z=60.0, bulge=8.0, n=9) -> Mesh:
     """A box whose upper side is curved in both directions."""
     share = np.linspace(0.0, 1.0, n)

@@ -20,7 +20,10 @@ from gso.typing import Array, Ints
 from gso.unfolding import join_patches
 from gso.unfolding.dual_edges import dual_edges
 from gso.unfolding.folding import misfit
+from gso.wording import percent
 
+#: Strain up to which a pattern is exact.
+EXACT = 1e-6
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7
 #: Angle between normals at both ends of an edge, in radians, up to which it is along a ruling.
@@ -176,6 +179,20 @@ def folded_pattern(
         sliced.label,
         seam_angles(sliced, shape),
     )
+
+
+def as_it_is(strain: float) -> str:
+    """Say that a design is kept, and by how much its pattern strains if it is not exact.
+
+    >>> as_it_is(0.0)
+    'the design is developable as it is: nothing was moved'
+    >>> print(as_it_is(5e-4))
+    the design is nearly developable: nothing was moved, and the pattern strains by 0.0500 % at most
+    """
+    if strain <= EXACT:
+        return "the design is developable as it is: nothing was moved"
+    said = f"nothing was moved, and the pattern strains by {percent(strain)} at most"
+    return f"the design is nearly developable: {said}"
 
 
 def _apart(shape: Recognised, flat: Array) -> Ints:

@@ -15,9 +15,6 @@ from gso.seams.options import PieceSettings
 from gso.seams.sheets import Sheet
 from gso.typing import Ints
 
-#: What is said of a design that is kept.
-AS_IT_IS = "the design is developable as it is: nothing was moved"
-
 
 def exact_pieces(design: Mesh, kept: Ints, settings: PieceSettings) -> Candidate | None:
     """Cut a design into the parts of its folded pattern; None if it is not developable as it is.

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso import exact
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, OptionError
 from gso.executors import open_executor, processors
@@ -29,7 +30,7 @@ from gso.seams.candidates import (
 from gso.seams.cutting import cut
 from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
-from gso.seams.exact_pieces import AS_IT_IS, exact_pieces
+from gso.seams.exact_pieces import exact_pieces
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, prices, too_large
@@ -191,7 +192,8 @@ def pieces(
         found = exact_pieces(design, kept, settings)
         if found is not None:
             out = packed(found, None, design, kept, settings)
-            out = replace(out, notes=(*out.notes, AS_IT_IS))
+            strain = max((s.exact_strain or 0.0) if s else 0.0 for s in found.sheets)
+            out = replace(out, notes=(*out.notes, exact.as_it_is(strain)))
     if out is None or not (out.usable or crosses_itself(out.reasons)):
         try:
             other = _searched(design, kept, factor, symmetric, settings, workers)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.exact import EXACT, as_it_is
 from gso.io import SPLINE_SUFFIXES, Solid, suffix_of
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
@@ -295,7 +296,10 @@ def fabricate(
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
         said = without_tabs(bare) if asked.tabs else []
-        if asked.tabs is not None and one.record["deviation_max"] == 0.0:
+        is_kept = one.record["deviation_max"] == 0.0
+        if is_kept and settings.formulation == "ruled" and one.record["strain_max"] > EXACT:
+            said.append(as_it_is(one.record["strain_max"]))
+        if is_kept and asked.tabs is not None:
             why, through = _of_paper(why)
             said += through
         if asked.seam_strip:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gso.errors import OptionError
-from gso.exact import folded_pattern
+from gso.exact import as_it_is, folded_pattern
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.metrics import Distances
@@ -74,7 +74,7 @@ def exact_strips(design: Mesh, request: StripsRequest, kept: Ints) -> StripsResu
         iterations=0,
         energy={"distance": 0.0},
         seconds={"strips": time.perf_counter() - clock},
-        notes=design.notes,
+        notes=(*design.notes, as_it_is(found.strain)),
         details={"strips": surface.strips, "rulings_from": "design"},
         **StripsResult.attributes(surface),
     )
