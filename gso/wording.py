@@ -16,10 +16,18 @@ def places(what: str, ids: Sequence[int | str]) -> str:
     >>> places("face", [3]), places("vertex", range(8))
     ('face 3', 'vertices 0, 1, 2, 3, 4, 5 and 2 more')
     """
-    named = ", ".join(map(str, ids[:_NAMED]))
-    more = f" and {len(ids) - _NAMED} more" if len(ids) > _NAMED else ""
     several = "vertices" if what == "vertex" else f"{what}s"
-    return f"{several if len(ids) > 1 else what} {named}{more}"
+    return f"{several if len(ids) > 1 else what} {listed(ids)}"
+
+
+def listed(names: Sequence[int | str], most: int = _NAMED) -> str:
+    """List the first few numbers or names, and say how many others there are.
+
+    >>> listed(["a", "b"]), listed(range(5), 3)
+    ('a, b', '0, 1, 2 and 2 more')
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(map(str, names[:most])) + more
 
 
 def length(value: float, unit: str = "", digits: int = 3) -> str:

@@ -36,6 +36,7 @@ from gso.mesh.attributes import Attributes, Labels
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
 from gso.typing import Array, Ints
+from gso.wording import listed
 
 #: Chord tolerance by default, relative to the size, and the largest angle between neighbouring
 #: facets, in radians: bends of 30 degrees, too, have four of them.
@@ -182,8 +183,7 @@ def _accuracy(finest: float, coarsest: float, given: GivenSurfaces) -> str:
     said = f"curved edges and faces are within {chord} mm of their chords"
     if not free:
         return said
-    more = f" and {len(free) - _NAMED} more" if len(free) > _NAMED else ""
-    return f"{said}; not developable: {', '.join(free[:_NAMED])}{more}"
+    return f"{said}; not developable: {listed(free, _NAMED)}"
 
 
 def _leaves(label: TDF_Label, place: TopLoc_Location, name: str) -> Iterator[_Body]:

@@ -82,19 +82,26 @@ def _polygons(words: Words, v: Ints, f: Ints) -> tuple[Ints, Ints, Ints]:
     count = words.count[f] - 1
     short = count < 3
     words.refuse(f, short, f"a face needs three corners or more, not {count[short.argmax()]}")
-    corner = ranges(words.first[f] + 1, count)
+    corner, index = _vertices_of(words, v, f, "face")
+    return corner, index, count
+
+
+def _vertices_of(words: Words, v: Ints, rows: Ints, what: str) -> tuple[Ints, Ints]:
+    """Return the words that refer to vertices in the rows of faces or polylines, and indices."""
+    count = words.count[rows] - 1
+    corner = ranges(words.first[rows] + 1, count)
     number = words.ints(corner, until=b"/")
-    index = _from_front(number, v, f, count)
+    index = _from_front(number, v, rows, count)
     outside = (index < 0) | (index >= v.size)
     if outside.any():
         at = int(outside.argmax())
         words.fail(
             corner[at],
-            f"a face refers to vertex {number[at]}, but "
+            f"a {what} refers to vertex {number[at]}, but "
             + ("vertices count from 1" if number[at] == 0 else f"the file has {v.size} vertices")
             + "; is the file cut off?",
         )
-    return corner, index, count
+    return corner, index
 
 
 def _from_front(number: Ints, rows: Ints, f: Ints, count: Ints) -> Ints:
@@ -171,15 +178,9 @@ def polylines(data: bytes) -> list[Array]:
     v, rows = words.rows(b"v"), words.rows(b"l")
     if not (rows.size and v.size):
         return []
-    count = words.count[rows] - 1
-    corner = ranges(words.first[rows] + 1, count)
-    number = words.ints(corner, until=b"/")
-    index = _from_front(number, v, rows, count)
-    outside = (index < 0) | (index >= v.size)
-    if outside.any():
-        at = int(outside.argmax())
-        words.fail(corner[at], f"a polyline refers to vertex {number[at]}, which is not there")
-    return np.split(_vertices(words, v)[index], np.cumsum(count)[:-1])
+    _, index = _vertices_of(words, v, rows, "polyline")
+    ends = np.cumsum(words.count[rows] - 1)[:-1]
+    return np.split(_vertices(words, v)[index], ends)
 
 
 def write(mesh: Mesh, file: BinaryIO) -> None:

@@ -195,7 +195,7 @@ def _together(bodies: Sequence[_Body], scale: float, notes: tuple[str, ...]) -> 
         image = np.concatenate(images)[faces[done.kept]]
         known = GivenSurfaces(surfaces, piece_of, image[..., :2], image[..., 2:])
     labels = {kind: Labels(tuple(row), body_of) for kind, row in rows}
-    if len(compact.T) > 3 and (compact[:, 3] < 0).all():
+    if (compact[:, 3:] < 0).all():
         compact = compact[:, :3]
     return Surface(points[used], compact, notes, Attributes(labels=labels, surfaces=known))
 
@@ -276,14 +276,9 @@ def _of_surface(surface: rhino3dm.NurbsSurface, chord: float | None) -> _Piece:
             if off.max() <= allowed:
                 break
             divisions = finer
-    grid, nodes = (
-        _grid(surface, divisions),
-        np.stack(np.meshgrid(*_parameters(surface, divisions), indexing="ij"), axis=-1),
-    )
-    n, m = grid.shape[:2]
-    index = np.arange(n * m).reshape(n, m)
-    corners = [index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]]
-    faces = np.stack(corners, axis=-1).reshape(-1, 4)
+    grid = _grid(surface, divisions)
+    nodes = np.stack(np.meshgrid(*_parameters(surface, divisions), indexing="ij"), axis=-1)
+    faces = topology.grid_faces(*grid.shape[:2])
     return _Piece(grid.reshape(-1, 3), faces, surface, nodes.reshape(-1, 2))
 
 

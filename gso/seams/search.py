@@ -192,8 +192,7 @@ def pieces(
         found = exact_pieces(design, kept, settings)
         if found is not None:
             out = packed(found, None, design, kept, settings)
-            strain = max((s.exact_strain or 0.0) if s else 0.0 for s in found.sheets)
-            out = replace(out, notes=(*out.notes, exact.as_it_is(strain)))
+            out = replace(out, notes=(*out.notes, exact.as_it_is(found.strain)))
     if out is None or not (out.usable or crosses_itself(out.reasons)):
         try:
             other = _searched(design, kept, factor, symmetric, settings, workers)

@@ -42,7 +42,7 @@ from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import fitted, parts_from
-from gso.workshop.seam_strips import SMOOTH
+from gso.workshop.seam_strips import no_such_seam
 from gso.workshop.solids import folded_solids
 from gso.workshop.tabs import without_tabs
 from gso.workshop.work import made_all
@@ -304,7 +304,7 @@ def fabricate(
             said += through
         if asked.seam_strip:
             why = merge(why, compare({Code.SEAM_STRIP: Measurement.count("seam", bare)}, {}))
-            said += _other_seams(one, asked)
+            said += no_such_seam(one.matings, asked.seam_overlap, asked.seam_flange)
         notes += [f"{one.name}: {note}" for note in said]
         record["reasons"] = _words(why)
         records.append(record)
@@ -371,21 +371,6 @@ def fabricate(
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
-
-
-def _other_seams(made: Made, finish: Finish) -> list[str]:
-    """Say where no seam is of the kind that strips along seams are asked for."""
-    smooth = [abs(seam.angle) <= SMOOTH for seam in made.matings]
-    if (finish.seam_overlap and any(smooth)) or (finish.seam_flange and not all(smooth)):
-        return []
-    if (finish.seam_overlap and finish.seam_flange) or not smooth:
-        return ["there is no seam, so that there is no overlap or flange"]
-    if finish.seam_overlap:
-        return [
-            "no seam is smooth, so that none has an overlap; --seam-flange is for seams with "
-            "an angle"
-        ]
-    return ["no seam has an angle, so that none has a flange; --seam-overlap is for smooth seams"]
 
 
 def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.io.svg_page import SVGPage
 from gso.typing import Json
+from gso.wording import listed
 from gso.workshop.certificate import codes
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
@@ -48,7 +49,7 @@ def page(certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing]) ->
     """Return the page as HTML."""
     good = certificate["usable"]
     names = [escape(one["name"]) for one in certificate["designs"]]
-    title = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    title = listed(names, 3)
     said = "can be made as it was asked for" if good else "cannot be made as it was asked for"
     lines = [
         "<!DOCTYPE html>",

@@ -11,9 +11,7 @@ import numpy as np
 from gso.geometry.polygon import signed_area
 from gso.pattern import Bend, Zone
 from gso.typing import Array
-
-#: Number of faces that are named in words.
-_NAMED = 6
+from gso.wording import listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +114,7 @@ class Part:
     @property
     def made_of(self) -> str:
         """The faces of a CAD file that it is made of, in words; empty if there are none."""
-        return ", ".join(self.faces[:_NAMED]) + (
-            f" and {len(self.faces) - _NAMED} more" if len(self.faces) > _NAMED else ""
-        )
+        return listed(self.faces)
 
     @property
     def size(self) -> tuple[float, float]:

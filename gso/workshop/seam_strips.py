@@ -11,6 +11,7 @@ import numpy as np
 from gso.geometry.vectors import unit
 from gso.pattern import Bend
 from gso.typing import Array, Flags
+from gso.workshop.panels import Mating
 from gso.workshop.part import Part
 from gso.workshop.polygons import common, largest, region, rings, united, without
 from gso.workshop.tabs import TabSeam, beside, divided, face_angles, room
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
 #: Angle in radians up to which a seam is smooth: bends of less are not drawn.
-SMOOTH = np.radians(0.2)
+_SMOOTH = np.radians(0.2)
 #: Area of a strip that may lie on the part or beside the face that it covers, relative to its own,
 #: and distance of points that are the same, relative to the size of a part.
 _ON, _SAME = 1e-6, 1e-7
@@ -68,7 +69,7 @@ def with_strips(
             sides.setdefault(seam.number, []).append((k, seam))
     for number, both in sorted(sides.items()):
         angle = both[0][1].angle
-        width = overlap if abs(angle) <= SMOOTH else flange
+        width = overlap if abs(angle) <= _SMOOTH else flange
         if np.isnan(angle):
             without_strip.append(number)
         elif width is not None:
@@ -81,6 +82,21 @@ def with_strips(
             else:
                 without_strip.append(number)
     return made, without_strip
+
+
+def no_such_seam(seams: Sequence[Mating], overlap: float | None, flange: float | None) -> list[str]:
+    """Say that no seam is of the kind that strips of these widths are for."""
+    smooth = [abs(seam.angle) <= _SMOOTH for seam in seams]
+    if (overlap and any(smooth)) or (flange and not all(smooth)):
+        return []
+    if (overlap and flange) or not smooth:
+        return ["there is no seam, so that there is no overlap or flange"]
+    if overlap:
+        return [
+            "no seam is smooth, so that none has an overlap; --seam-flange is for seams with "
+            "an angle"
+        ]
+    return ["no seam has an angle, so that none has a flange; --seam-overlap is for smooth seams"]
 
 
 def _second(side: tuple[tuple[int, TabSeam], tuple[int, TabSeam]]) -> bool:
@@ -107,7 +123,7 @@ def _with_strip(
     is_straight = all(_straight(x, near) for x in (line, other))
     if is_straight:
         line, other = line[[0, -1]], other[[0, -1]]
-    is_flange = abs(seam.angle) > SMOOTH
+    is_flange = abs(seam.angle) > _SMOOTH
     longer = 0.0 if sheet is None or not is_flange else float(sheet.change(seam.angle))
     crossing = _crossing(part, seam, near)
     if len(line) < 2 or (is_flange and (not is_straight or crossing or np.isinf(seam.angle))):
