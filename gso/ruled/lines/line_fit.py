@@ -54,26 +54,32 @@ class LineFitter:
         self.mesh = mesh
         self.normals = vertex_normals(mesh)
         self.near = Nearest(mesh, self.normals)
-        self.outline = Polylines.join(
-            [Polylines.of(mesh.vertices[loop], closed=True) for loop in mesh.boundary_loops]
-        )
+        self._loops = mesh.boundary_loops
         sharp = [
             loop[turns(unit(np.roll(way, -1, axis=0) - way)) > _SHARP]
-            for loop in mesh.boundary_loops
+            for loop in self._loops
             for way in [mesh.vertices[loop]]
         ]
-        self._corners = np.unique(np.concatenate(sharp))
+        self._corners = np.unique(np.concatenate([np.empty(0, np.int64), *sharp]))
         corner = mesh.vertices[mesh.triangles]
         area = 0.5 * lengths(cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
         share = np.zeros(len(mesh.vertices))
         np.add.at(share, mesh.triangles.ravel(), np.repeat(area, 3) / (3.0 * area.sum()))
         self.share = share
 
-    def fit(self, polygons: Polygons, start: Array, *, fairness: float = _FAIR) -> Array:
+    def fit(
+        self,
+        polygons: Polygons,
+        start: Array,
+        *,
+        fairness: float = _FAIR,
+        tangential: float = _TANGENTIAL,
+    ) -> Array:
         """Fit strips, from positions (n, 3) of the mesh's vertices; return their positions.
 
         Vertices that are no corners stay. With more fairness, the least weight of second
-        differences, folds are rarer and distances larger.
+        differences, folds are rarer and distances larger; with a larger factor on tangential
+        displacements corners stay nearer to where they were.
         """
         used = np.unique(np.concatenate(polygons.rings))
         number = np.full(len(self.mesh.vertices), -1)
@@ -81,13 +87,13 @@ class LineFitter:
         variables = free(Layout.of(len(used), "surface"))
         triangles = number[divided(polygons.rings, start)[0]]
         planes = number[polygons.planes(start)]
-        fixed = self._fixed(polygons, used, number)
-        smooth = self._smooth(polygons, number)
+        fixed = self._fixed(polygons, used, number, start, tangential)
+        smooth = self._smooth(polygons, number, start)
         x = start[used].ravel()
 
         def solved(x: Array, planar: Term, stiff: float, fair: float) -> Array:
             items = [
-                *self._distances(x.reshape(-1, 3), triangles),
+                *self._distances(x.reshape(-1, 3), triangles, tangential),
                 *fixed,
                 Weighted(planar, stiff),
                 *(Weighted(term, fair * share) for term, share in smooth),
@@ -108,7 +114,7 @@ class LineFitter:
         out[used] = x.reshape(-1, 3)
         return planarised(polygons, out)
 
-    def _distances(self, points: Array, triangles: Ints) -> list[Weighted]:
+    def _distances(self, points: Array, triangles: Ints, tangential: float) -> list[Weighted]:
         """Return the distances from the design to the strips, and back."""
         mesh = self.mesh
         which, shares, _ = Nearest.of(points, triangles).locate(mesh.vertices)
@@ -118,7 +124,7 @@ class LineFitter:
             mesh.vertices,
             self.normals,
             self.share,
-            tangential=_TANGENTIAL,
+            tangential=tangential,
         )
         corner = points[triangles]
         feet = self.near.feet(corner.mean(axis=1))
@@ -127,14 +133,13 @@ class LineFitter:
         back = barycentric(triangles, third, feet.points, feet.normals, area / area.sum())
         return [Weighted(there, 1.0), Weighted(back, _BACK)]
 
-    def _fixed(self, polygons: Polygons, used: Ints, number: Ints) -> list[Weighted]:
+    def _fixed(
+        self, polygons: Polygons, used: Ints, number: Ints, start: Array, tangential: float
+    ) -> list[Weighted]:
         """Return the terms of the outline, and of the places of vertices."""
-        mesh = self.mesh
-        rim = number[np.concatenate(mesh.boundary_loops)]
-        share = 1.0 / len(rim)
-        own = mesh.vertices[used]
+        own = start[used]
         ways = unit(self.normals[used])
-        factor = np.full((1, len(used)), _TANGENTIAL)
+        factor = np.full((1, len(used)), tangential)
         places = Term(
             "proximity",
             proximity_residual,
@@ -143,18 +148,30 @@ class LineFitter:
             constants=np.concatenate([own.T, ways.T, factor]),
             linear=True,
         )
-        sharp = number[self._corners]
-        corners = position(sharp, mesh.vertices[self._corners], np.full(len(sharp), share))
         return [
-            Weighted(corners, _CORNERS),
-            Weighted(curve(rim, self.outline, weight=share), _OUTLINE),
+            *self._outline(number),
             Weighted(places, _PLACES),
-            Weighted(self._facing(polygons, number), _FACING),
+            Weighted(self._facing(polygons, number, start), _FACING),
         ]
 
-    def _facing(self, polygons: Polygons, number: Ints) -> Term:
-        """Return the barrier against polygons that fold over."""
+    def _outline(self, number: Ints) -> list[Weighted]:
+        """Return the terms of the corners that are on the outline, if there is one."""
+        if not self._loops:
+            return []
         v = self.mesh.vertices
+        lines = Polylines.join([Polylines.of(v[loop], closed=True) for loop in self._loops])
+        rim = number[np.concatenate(self._loops)]
+        rim = rim[rim >= 0]
+        share = 1.0 / len(rim)
+        kept = self._corners[number[self._corners] >= 0]
+        corners = position(number[kept], v[kept], np.full(len(kept), share))
+        return [
+            Weighted(corners, _CORNERS),
+            Weighted(curve(rim, lines, weight=share), _OUTLINE),
+        ]
+
+    def _facing(self, polygons: Polygons, number: Ints, v: Array) -> Term:
+        """Return the barrier against polygons that fold over."""
         corners = [ring for ring in polygons.rings if len(ring) == 4]
         quads = np.array(corners, np.int64).reshape(-1, 4)
         ids = np.concatenate(
@@ -174,13 +191,13 @@ class LineFitter:
         ids, ways = ids[kept], ways[kept] / area[kept, None]
         return facing(number[ids], ways, mean_weights(len(ids)), least=_LEAST)
 
-    def _smooth(self, polygons: Polygons, number: Ints) -> list[tuple[Term, float]]:
+    def _smooth(self, polygons: Polygons, number: Ints, start: Array) -> list[tuple[Term, float]]:
         """Return second differences of the displacement, along creases and across them."""
         out = []
         for triples, share in ((polygons.lines, 1.0), (polygons.across, _ACROSS)):
             if not len(triples):
                 continue
-            a, b, c = self.mesh.vertices[triples].transpose(1, 0, 2)
+            a, b, c = start[triples].transpose(1, 0, 2)
             before, after = lengths(b - a), lengths(c - b)
             ahead = before / (before + after)
             factors = np.stack([ahead - 1.0, np.ones(len(ahead)), -ahead])

@@ -42,6 +42,8 @@ def line_surface(
     vertices, rings = points[used], [number[ring] for ring in polygons.rings]
     faces, owner = _faces(rings, vertices)
     mesh = Mesh(vertices, faces)
+    # Triangles only: the fourth corner is gone.
+    faces = faces[:, : mesh.faces.shape[1]]
     planes = _Planes.of(rings, vertices)
     hinges, creases = _edges(rings, number[polygons.rulings])
     tree = _tree(hinges, vertices, len(rings))

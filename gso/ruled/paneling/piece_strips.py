@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,13 +13,14 @@ from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import GSOError, MeshError
 from gso.executors import open_executor
-from gso.mesh import Mesh
+from gso.mesh import Mesh, Nearest
 from gso.pattern import Pattern
 from gso.pipeline.component_results import renumber, worst_status
 from gso.result import Result, StripsResult
 from gso.ruled.fold_lines import Folds
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import RULED, Options
+from gso.ruled.paneling.shared_seams import of_shared_seams
 from gso.ruled.paneling.strips_request import StripsRequest, silent
 from gso.ruled.paneling.surface_strips import check_whole, of_surface, wanted
 from gso.ruled.ruled_surface import RuledSurface
@@ -31,9 +32,11 @@ from gso.seams.joint_solve import gap, solve_pieces
 from gso.seams.segmentation import Segmentation
 from gso.seams.sheets import flattened
 from gso.solver import Callback
+from gso.solver.minimiser import says_no
 from gso.status import Progress, Status
 from gso.tasks import Limits, check
 from gso.tasks.start import Start
+from gso.typing import Keywords
 from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
 from gso.wording import length
 
@@ -45,6 +48,8 @@ JOINT, _LEAST, _MOST = 0.9, 0.1, 0.5
 _NEAR = 0.01
 #: Largest number of strips of a piece that "auto" tries.
 _STRIPS = 8
+#: Numbers of points on the sides of a square of mean area, one after the other.
+_SIDES = (8, 14, 20)
 #: Number of pieces from which on processes make their strips.
 _MANY = 8
 
@@ -59,28 +64,18 @@ class _Joint:
         The whole design, from which distances count.
     shape : Pieces
         Its pieces, made developable; their seams are closed.
-    result : Result or None
-        The solve; None if the shape stays as it is.
-    sheets : sequence of Sheet or None
-        Patterns of the pieces, as far as they are known.
+    result : Result
+        The solve.
     """
 
     design: Mesh
     shape: Pieces
-    result: Result | None
-    sheets: Sequence[Sheet | None]
+    result: Result
 
-    @property
-    def first(self) -> Result:
-        """The solve, or the design as the result of none."""
-        if self.result is not None:
-            return self.result
-        return Result("developable", RULED, self.design, self.design, None, Status.CONVERGED)
-
-    def pattern(self, number: int) -> Sheet | None:
-        """Return the flat pattern of a piece; None if it has none."""
-        known = self.sheets[number] if self.sheets else None
-        return flattened(self.shape[number].mesh) if known is None else known
+    @cached_property
+    def sheets(self) -> list[Sheet | None]:
+        """The flat patterns of the pieces; None for those without."""
+        return [flattened(piece.mesh) for piece in self.shape]
 
 
 def of_pieces(
@@ -114,15 +109,15 @@ def of_pieces(
         The pieces cannot be solved, or one of them is no disk.
     """
     clock = time.perf_counter()
-    if isinstance(division, Segmentation):
-        joint = _Joint(light.design, division, division.result, division.sheets)
-    else:
-        joint = _together(light, request, division)
-    if joint.result is not None and joint.result.status is Status.CANCELLED:
+    joint = _together(light, request, division)
+    if joint.result.status is Status.CANCELLED:
         return _cancelled(joint), ()
     seconds = time.perf_counter() - clock
-    tried: list[tuple[StripsResult, tuple[Reason, ...]]] = []
-    for strips, strict in _candidates(joint, request, light):
+    tried, stopped = _sharing_seams(joint, request, light, division.design)
+    if stopped:
+        return _cancelled(joint), ()
+    found = bool(tried) and not tried[0][1]
+    for strips, strict in () if found else _candidates(joint, request, light):
         if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
             return _cancelled(joint), ()
         # What counts is the distance of the whole from the design, and the gaps at seams.
@@ -134,6 +129,46 @@ def of_pieces(
     result, reasons = min(tried, key=lambda one: (len(one[1]) > 0, one[0].ruled.farthest))
     result.seconds |= {"pieces": seconds, "strips": time.perf_counter() - clock - seconds}
     return result, reasons
+
+
+def _sharing_seams(
+    joint: _Joint, request: StripsRequest, light: LightDesign, target: Mesh
+) -> tuple[list[tuple[StripsResult, tuple[Reason, ...]]], bool]:
+    """Return the pieces as one strip each, with the same points on both sides of their seams.
+
+    Without an allowed distance they are taken if they are near. The second value tells whether the
+    callback ended the solve.
+    """
+    options, design, count = request.options, joint.design, len(joint.shape)
+    near = _NEAR * design.diagonal if light.allowed is None else light.allowed
+    if options.number is not None or not all(piece.is_disk for piece in joint.shape):
+        return [], False
+    stopped, tried = False, []
+
+    def told(number: int) -> bool:
+        nonlocal stopped
+        name = f"piece {number + 1} of {count}: rulings"
+        progress = Progress(number, count, 0, 1, 0.0, {}, 1.0, name)
+        stopped = request.callback is not None and says_no(request.callback(progress))
+        return not stopped
+
+    request.say("rulings between seams")
+    for side in _SIDES:
+        surface = of_shared_seams(target, joint.shape, joint.sheets, near, side, tell=told)
+        if surface is None:
+            break
+        moved = Nearest(surface.mesh).locate(design.vertices)[2]
+        surface = replace(surface, moved=moved, deviation=surface.distances(design, parts=True))
+        if light.allowed is None and surface.farthest > near:
+            continue
+        met = wanted(options, request.max_deviation, 1.0).met(surface)
+        status = Status.CONVERGED if met else Status.TARGET_MISSED
+        details: Keywords = {"strips": [1] * count, "seam_gap": 0.0}
+        made = _result(joint, surface, [status], ["both sides of a seam are the same"], details)
+        tried.append((made, judge(made, request.limits)))
+        if not tried[-1][1]:
+            return tried[-1:], False
+    return tried, stopped
 
 
 def _candidates(
@@ -201,7 +236,7 @@ def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> _
     joint = check("developable", max_deviation=far, x0=request.start, verdict=False)
     joint = joint.with_options(joint.options.for_pieces())
     result = solve_pieces(division, joint, request.constraints, request.callback)
-    return _Joint(light.design, division if result.pieces is None else result.pieces, result, ())
+    return _Joint(light.design, division if result.pieces is None else result.pieces, result)
 
 
 def _within(made: Result | GSOError, follow: float, options: Options) -> Result | GSOError:
@@ -278,7 +313,7 @@ def _part(
             made = replace(made, status=Status.CONVERGED if met else Status.TARGET_MISSED)
             reasons = tuple(why.within(f"piece {name}") for why in judge(made, Limits()))
             return _Part(made.ruled, made.ruled.strips, made.status, reasons, made.iterations)
-    sheet = joint.pattern(number) if leave else None
+    sheet = joint.sheets[number] if leave else None
     if sheet is not None:
         return _as_it_is(name, sheet, request)
     why = made if isinstance(made, GSOError) else MeshError("it cannot be laid flat")
@@ -320,7 +355,6 @@ def _merged(joint: _Joint, parts: Sequence[_Part]) -> StripsResult:
         points[own.vertices] = part.surface.moved
     apart = gap(opened.mesh.replaced(points), opened.seams)
     numbers = [part.strips for part in parts]
-    first = joint.first
     notes = [
         f"both sides of a seam are up to {length(apart)} apart, as strips follow the joint result "
         f"within a distance; number of strips of each piece: {', '.join(map(str, numbers))}"
@@ -331,18 +365,33 @@ def _merged(joint: _Joint, parts: Sequence[_Part]) -> StripsResult:
             f"no strips follow these pieces closely enough: {bare}; they have no bend lines, and "
             "are nearly developable"
         )
+    statuses = [joint.result.status, *(part.status for part in parts)]
+    made = _result(joint, surface, statuses, notes, {"strips": numbers, "seam_gap": apart})
+    made.iterations += sum(part.iterations for part in parts)
+    return made
+
+
+def _result(
+    joint: _Joint,
+    surface: RuledSurface,
+    statuses: Sequence[Status],
+    notes: Sequence[str],
+    details: Keywords,
+) -> StripsResult:
+    """Return the result that a surface of all pieces is."""
+    first = joint.result
     return StripsResult(
         task="developable",
         formulation=RULED,
-        design=design,
-        status=worst_status([first.status, *(part.status for part in parts)]),
-        iterations=first.iterations + sum(part.iterations for part in parts),
+        design=joint.design,
+        status=worst_status(statuses),
+        iterations=first.iterations,
         energy=first.energy,
         history=first.history,
         backend=first.backend,
         warm_start=first.warm_start,
-        notes=(*design.notes, *notes),
-        details={**first.details, "strips": numbers, "seam_gap": apart},
+        notes=(*joint.design.notes, *notes),
+        details={**first.details, **details},
         pieces=joint.shape,
         **StripsResult.attributes(surface),
     )
@@ -359,8 +408,8 @@ def _reasons(
 
 def _cancelled(joint: _Joint) -> Result:
     """Return the joint result, as the solve was ended before there were strips."""
-    notes = (*joint.first.notes, "the solve was ended before there were strips")
-    return replace(joint.first, formulation=RULED, status=Status.CANCELLED, notes=notes)
+    notes = (*joint.result.notes, "the solve was ended before there were strips")
+    return replace(joint.result, formulation=RULED, status=Status.CANCELLED, notes=notes)
 
 
 def _numbered(callback: Callback | None, place: int, count: int) -> Callback | None:
