@@ -64,6 +64,11 @@ class LineStrips:
         """The smallest number of strips; 0 where there are no lines."""
         return min((choice.least for choice in self.choices), default=0)
 
+    @property
+    def most(self) -> int:
+        """The largest number of strips; 0 where there are no lines."""
+        return max((choice.rows for choice in self.choices), default=0)
+
     def predicted(self, count: int) -> float:
         """Return the distance that is predicted for a number of strips."""
         found = (choice.lines(count) for choice in self.choices)
@@ -124,7 +129,7 @@ class LineStrips:
         """Return as few strips as meet bounds, or else the best."""
         # A single strip is of use where the lines that become rulings are straight.
         least = max(self.least, 1 if self.predicted(1) <= EXACT else 2)
-        most = min(wanted.most, max((choice.rows for choice in self.choices), default=0))
+        most = min(wanted.most, self.most)
         low, high = least - 1, None
         aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)

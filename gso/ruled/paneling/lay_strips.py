@@ -10,11 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from gso.components import split
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, MeshError
-from gso.geometry.polygon import rectangle
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of, warning
@@ -25,6 +23,7 @@ from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
+from gso.ruled.paneling.sheet_strips import against_sheet, divided, on_sheets
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import (
     along_lines,
@@ -39,7 +38,7 @@ from gso.status import Status
 from gso.tasks import Limits
 from gso.tasks.start import Start
 from gso.typing import Ints, Keywords, MeshLike
-from gso.verdict import Code, Measurement, Reason, compare, crosses_itself, judge, ordered
+from gso.verdict import Code, Reason, crosses_itself, judge, ordered
 
 
 def strips(
@@ -316,20 +315,28 @@ class _Task:
         if result is None or not (asked.max_deviation or (folded and _is_whole(self.design))):
             return []
         reasons = judge(result, asked.limits)
-        return [_Tried(result, ordered([*reasons, *_against_sheet(result, asked)]))]
+        return [_Tried(result, ordered([*reasons, *against_sheet(result, asked)]))]
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
         asked = self.request
         if any(one.is_close for one in tried) or not _is_whole(light.mesh):
             return []
         asked.say("as a whole")
-        result = light.whole(of_surface(light.mesh, asked, light.allowed), asked)
+
+        def made(options: Options) -> Result:
+            own = replace(asked, options=options)
+            return light.whole(of_surface(light.mesh, own, light.allowed), own)
+
+        def again(count: int) -> Result:
+            return made(replace(asked.options, strips=count))
+
+        result = on_sheets(made(asked.options), asked, again)
         clock = time.perf_counter()
         reasons: tuple[Reason, ...] = ()
         if asked.verdict or self.divisible:
             violation = violation_of(case_of(self.design, asked)) if asked.constraints else 0.0
             own = judge(result, asked.limits, violation)
-            reasons = ordered([*own, *_against_sheet(result, asked)])
+            reasons = ordered([*own, *against_sheet(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
         return [_Tried(result, reasons)]
 
@@ -358,7 +365,7 @@ class _Task:
         for one in tried:
             surface, bound = one.result.ruled, asked.max_deviation
             if one.holds and surface is not None and bound is not None and self.divisible:
-                most = surface.strips - 1
+                most = min(surface.strips - 1, lines.most)
                 if _FAR * lines.predicted(most) > bound / self.design.diagonal:
                     return []
             elif one.is_near if self.divisible else one.is_close:
@@ -368,18 +375,25 @@ class _Task:
 
     def _of_lines(self, lines: LineStrips, most: int | None) -> list[_Tried]:
         asked = self.request
+
+        def again(count: int) -> Result | None:
+            options = replace(asked.options, strips=count)
+            return along_lines(self.design, replace(asked, options=options), lines)
+
         result = along_lines(self.design, asked, lines, most=most)
         if result is None:
             return []
+        result = on_sheets(result, asked, again)
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
-        return [_Tried(result, ordered([*own, *_against_sheet(result, asked)]))]
+        return [_Tried(result, ordered([*own, *against_sheet(result, asked)]))]
 
     def _in_pieces(self, light: LightDesign, division: Pieces) -> _Tried:
         asked = self.request
         if division is self.division:
             light = LightDesign(self.design, self.design, asked.max_deviation)
         result, reasons = of_pieces(light, asked, division)
-        return _Tried(result, ordered([*reasons, *_against_sheet(result, asked)]))
+        result = divided(result, asked)
+        return _Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
 
 
 @dataclass(frozen=True)
@@ -449,14 +463,3 @@ def _without_darts(found: Segmentation) -> Pieces:
     # A seam within a piece may open a ring or a handle.
     whole = len(pieces) == 1 or all(piece.is_disk for piece in pieces)
     return pieces if whole else cut(design, Edges(found.edges))
-
-
-def _against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
-    """Return the reasons if parts of the pattern are larger than the sheet."""
-    pattern, sheet = result.pattern, request.sheet
-    if pattern is None or sheet is None:
-        return ()
-    sizes = [rectangle(pattern.flat[part.vertices])[1] for part in split(pattern.mesh)]
-    long, wide = np.array(sizes).T
-    measured = {Code.TOO_LONG: Measurement(long), Code.TOO_WIDE: Measurement(wide)}
-    return compare(measured, {Code.TOO_LONG: max(sheet), Code.TOO_WIDE: min(sheet)})
