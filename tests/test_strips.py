@@ -100,6 +100,49 @@ def test_a_closed_design_is_cut_into_pieces_without_darts(pieces, tmp_path):
     assert again.metrics == pytest.approx(result.metrics)
 
 
+def test_both_sides_of_a_seam_are_the_same(pieces):
+    result, _ = pieces
+    assert result.details["seam_gap"] == 0 and set(result.details["strips"]) == {1}
+    pattern = result.pattern
+    sides = np.linalg.norm(np.diff(pattern.flat[pattern.seams], axis=2)[:, :, 0], axis=2)
+    np.testing.assert_allclose(sides[:, 0], sides[:, 1], atol=1e-12 * result.design.diagonal)
+    at = pattern.vertex[pattern.seams]
+    np.testing.assert_array_equal(at[:, 0], at[:, 1])
+    # Every part has lines to bend along, and no vertex inside.
+    owner = pattern.mesh.components[result.folded.edges[:, 0]]
+    assert len(np.unique(owner)) == len(result.pieces)
+    assert pattern.mesh.half_edges.boundary_vertex.all()
+
+
+def test_pieces_of_a_cylinder_are_bent_along_its_rulings():
+    design = gso.as_mesh(cylinder(17))
+    halves = gso.cut(design, gso.seams.Path([5, 17 * 17 - 7]))
+    result = gso.strips(halves, max_deviation="1%")
+    assert result.usable, result.reasons
+    ends = result.mesh.vertices[result.ruled.rulings.edges]
+    way = ends[:, 1] - ends[:, 0]
+    long = np.linalg.norm(way, axis=1)
+    bent = np.abs(result.ruled.rulings.angles) > np.radians(1.0)
+    off = np.degrees(np.arccos(np.clip(np.abs(way[:, 1]) / long, 0.0, 1.0)))
+    assert np.average(off[bent], weights=long[bent]) < 5.0
+
+
+def test_parts_fit_the_sheet():
+    design = cap()
+    wanted = gso.strips(design, max_deviation="2%", **FAST)
+    sheet = (0.5 * design.diagonal, 0.25 * design.diagonal)
+    result = gso.strips(design, max_deviation="2%", sheet=sheet, **FAST)
+    assert result.usable, result.reasons
+    parts = split(result.pattern.mesh)
+    sizes = np.array([rectangle(result.pattern.flat[part.vertices])[1] for part in parts])
+    assert (sizes.max(axis=0) <= np.array(sheet) * (1 + 1e-9)).all()
+    assert len(parts) == result.details["strips"] == result.ruled.strips > wanted.ruled.strips
+    assert result.metrics["strain_max"] < 1e-9
+    # They are next to each other, and all of the surface.
+    whole = sum(part.area for part in split(result.mesh))
+    assert sum(part.area for part in parts) == pytest.approx(whole, rel=1e-9)
+
+
 def test_a_closed_design_needs_a_distance():
     with pytest.raises(gso.MeshError, match=r"boundary.*max_deviation"):
         gso.strips(ball(16))
@@ -163,7 +206,7 @@ def test_parts_have_to_fit_on_the_sheet():
     np.testing.assert_array_equal(enough.mesh.vertices, free.mesh.vertices)
     cut = gso.strips(design, max_deviation=allowed, sheet=(0.8 * long, 1.5 * wide), **FAST)
     assert cut.usable, cut.reasons
-    assert len(cut.pieces) > 1
+    assert cut.details["strips"] == len(split(cut.pattern.mesh)) > 1
     with pytest.warns(gso.ConvergenceWarning):
         one = gso.strips(design, strips=1, sheet=(0.1 * long, wide), **FAST)
     assert gso.verdict.Code.TOO_LONG in [why.code for why in one.reasons]

@@ -71,8 +71,10 @@ def strips(
     Otherwise the design is tried as one surface, with as few strips side by side as hold
     `max_deviation`. On quad meshes strips along the design's own lines are tried, too, which may
     close around. Where neither holds it, the design is cut into pieces without darts, which become
-    developable together, and each piece becomes strips that follow it. The result that holds the
-    limits is returned, or else the closest.
+    developable together, and are divided by rulings between shared points of their seams. Where
+    that does not hold the limits, each piece becomes strips that follow it. With a sheet, strips
+    are divided along rulings, so that parts fit. The result that holds the limits is returned, or
+    else the closest.
 
     Parameters
     ----------

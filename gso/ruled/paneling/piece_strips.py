@@ -1,4 +1,4 @@
-"""Strips of a design in pieces: the joint solve, and then strips that follow its pieces."""
+"""Strips of a design in pieces: the joint solve, then rulings between seams, or strips nearby."""
 
 from __future__ import annotations
 
@@ -83,8 +83,9 @@ def of_pieces(
 ) -> tuple[Result, tuple[Reason, ...]]:
     """Make strips of a design in pieces.
 
-    Strips follow the joint result within a distance, so seams are closed up to that distance. A
-    piece that no strips follow keeps the pattern of the joint solve, unless the number of strips
+    Pieces first become one strip each, with the same points on both sides of their seams. Where
+    that does not hold the limits, strips follow the joint result within a distance, so seams are
+    closed up to that distance. A piece that no strips follow keeps the pattern of the joint solve, unless the number of strips
     was named or no distance from the design was given.
 
     Parameters
