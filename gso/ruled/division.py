@@ -20,8 +20,9 @@ from gso.typing import Array, Flags, Ints
 _STRAIGHT = 1e-4
 #: Pieces of faces below this area, relative to the squared diagonal, are left out.
 _SLIVER = 1e-10
-#: Area, relative to the squared diagonal, of faces whose corners are on a line.
-_EMPTY = 1e-14
+#: Area, relative to the squared diagonal, of faces whose corners are on a line, also beside all
+#: other parts of a pattern.
+_EMPTY = 1e-11
 
 
 @dataclass(frozen=True)

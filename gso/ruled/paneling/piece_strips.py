@@ -85,8 +85,8 @@ def of_pieces(
 
     Pieces first become one strip each, with the same points on both sides of their seams. Where
     that does not hold the limits, strips follow the joint result within a distance, so seams are
-    closed up to that distance. A piece that no strips follow keeps the pattern of the joint solve, unless the number of strips
-    was named or no distance from the design was given.
+    closed up to that distance. A piece that no strips follow keeps the pattern of the joint solve,
+    unless the number of strips was named or no distance from the design was given.
 
     Parameters
     ----------
