@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.vectors import lengths
 from gso.mesh import topology
 from gso.ruled.lines.line_families import Band, Family
 from gso.typing import Array, Flags, Ints
@@ -65,14 +66,16 @@ class Choice:
     Parameters
     ----------
     family : Family
+    widest : float
+        Largest width of a strip.
     """
 
-    def __init__(self, family: Family):
+    def __init__(self, family: Family, widest: float = np.inf):
         self.family = family
         places = [_places(family, band) for band in family.bands]
         weight = 1.0 / max(sum(int(np.isfinite(p[:, :, 0]).sum()) for p in places), 1)
         self._costs = [
-            _costs(band, p, weight) for band, p in zip(family.bands, places, strict=True)
+            _costs(band, p, weight, widest) for band, p in zip(family.bands, places, strict=True)
         ]
         self._known: dict[int, tuple[Ints, float] | None] = {}
         self._far: dict[bytes, float] = {}
@@ -123,13 +126,18 @@ class Choice:
         return picked, far
 
 
-def _costs(band: Band, places: Array, weight: float) -> _Costs:
+def _costs(band: Band, places: Array, weight: float, widest: float) -> _Costs:
     """Return the costs of the strips of a band, on some of its levels if there are many."""
     lines = np.r_[-1, band.lines[: len(band.rows) - 1], -1]
     if band.closed:
         lines[[0, -1]] = band.lines[-1]
     levels = np.unique(np.linspace(0, len(lines) - 1, min(len(lines), _LEVELS)).round().astype(int))
-    return _Costs(lines[levels], weight * _sagittas(places[levels]))
+    places = places[levels]
+    cost = weight * _sagittas(places)
+    if np.isfinite(widest):
+        wide = [lengths(places - own) for own in places]
+        cost[np.nanmax(np.nan_to_num(wide), axis=2) > widest] = np.inf
+    return _Costs(lines[levels], cost)
 
 
 def _places(family: Family, band: Band) -> Array:

@@ -85,6 +85,29 @@ class LineStrips:
         best = min(known, key=lambda k: _distance(self.results[k]), default=None)
         return None if best is None else self._certain(best)
 
+    def narrow(self, number: int, widest: float, aim: float) -> Found | None:
+        """Return as few strips along a family of lines as are narrow enough, and near by forecast.
+
+        Parameters
+        ----------
+        number : int
+            Number of the family.
+        widest : float
+            Largest width of a strip.
+        aim : float
+            Largest distance that is predicted.
+
+        Returns
+        -------
+        Found or None
+            None if there are no lines so close together.
+        """
+        choice = Choice(self.choices[number].family, widest)
+        every = (choice.lines(count) for count in range(1, choice.rows + 1))
+        lines = next((found[0] for found in every if found is not None and found[1] <= aim), None)
+        tried = [] if lines is None else self._settled(choice, lines, np.inf)
+        return min(tried, key=lambda found: found.order, default=None)
+
     def _solve(self, count: int) -> None:
         """Solve for a number of strips; their largest distance is that of samples."""
         if count in self.results or self.stopped:
@@ -92,17 +115,26 @@ class LineStrips:
         half = max(count // 2, 1)
         limit = _WORSE * self.predicted(half)
         tried: list[Found] = []
-        for place, candidate in enumerate(self._candidates(count)):
-            for turn, settings in enumerate(_SETTINGS[: len(_SETTINGS) >> place]):
-                found = self._solved(*candidate, *settings)
-                tried += [] if found is None else [found]
-                near = found is None or turn > 0 or found.surface.farthest <= limit
-                if found is None or (near and found.surface.sound):
-                    break
+        for place, (choice, lines) in enumerate(self._candidates(count)):
+            tried += self._settled(choice, lines, limit, len(_SETTINGS) >> place)
         if tried:
             best = self.results[count] = min(tried, key=lambda found: found.order)
             if half >= max(self.least, 2) and _distance(best) > (False, limit):
                 self._solve(half)
+
+    def _settled(
+        self, choice: Choice, lines: Ints, limit: float, most: int = len(_SETTINGS)
+    ) -> list[Found]:
+        """Solve for strips by one setting after the other, until they are sound and near."""
+        tried: list[Found] = []
+        for turn, settings in enumerate(_SETTINGS[:most]):
+            found = self._solved(choice, lines, *settings)
+            if found is None:
+                break
+            tried.append(found)
+            if found.surface.sound and (turn > 0 or found.surface.farthest <= limit):
+                break
+        return tried
 
     def _certain(self, count: int) -> Found:
         """Return solved strips with the largest distance of all points."""

@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
-from gso.ruled.paneling.sheet_strips import against_sheet, divided, on_sheets
+from gso.ruled.paneling.sheet_strips import against_sheet, divided, longest_ruling, on_sheets
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import (
     along_lines,
@@ -329,10 +329,14 @@ class _Task:
             own = replace(asked, options=options)
             return light.whole(of_surface(light.mesh, own, light.allowed), own)
 
-        def again(count: int) -> Result:
-            return made(replace(asked.options, strips=count))
+        result = made(asked.options)
+        count, longest = result.details.get("strips", 0), longest_ruling(result)
 
-        result = on_sheets(made(asked.options), asked, again)
+        def narrow(widest: float) -> Result:
+            more = max(int(np.ceil(count * longest / widest)), count + 1)
+            return made(replace(asked.options, strips=more))
+
+        result = on_sheets(result, asked, [narrow])
         clock = time.perf_counter()
         reasons: tuple[Reason, ...] = ()
         if asked.verdict or self.divisible:
@@ -378,14 +382,14 @@ class _Task:
     def _of_lines(self, lines: LineStrips, most: int | None) -> list[_Tried]:
         asked = self.request
 
-        def again(count: int) -> Result | None:
-            options = replace(asked.options, strips=count)
-            return along_lines(self.design, replace(asked, options=options), lines)
+        def narrow(family: int, widest: float) -> Result | None:
+            return along_lines(self.design, asked, lines, narrow=(family, widest))
 
         result = along_lines(self.design, asked, lines, most=most)
         if result is None:
             return []
-        result = on_sheets(result, asked, again)
+        families = range(len(lines.choices))
+        result = on_sheets(result, asked, [partial(narrow, k) for k in families])
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
         return [_Tried(result, ordered([*own, *against_sheet(result, asked)]))]
 

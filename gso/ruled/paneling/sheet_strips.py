@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +16,8 @@ from gso.ruled.sheet_division import divided_to_fit
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare
 
-#: Numbers of strips that are tried for the length of a sheet, and for its width.
-_TRIES = 4
+#: Share of the sheet that strips may be wide.
+_ROOM = 0.97
 
 
 def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
@@ -41,7 +41,7 @@ def divided(result: Result, request: StripsRequest) -> Result:
         long, wide = rectangle(flat)[1]
         return bool(long <= max(sheet) and wide <= min(sheet))
 
-    surface = divided_to_fit(result.ruled, fits)
+    surface = divided_to_fit(result.ruled, result.design, fits)
     if surface is result.ruled:
         return result
     numbers: int | list[int] = surface.strips
@@ -57,7 +57,7 @@ def divided(result: Result, request: StripsRequest) -> Result:
 
 
 def on_sheets(
-    result: Result, request: StripsRequest, again: Callable[[int], Result | None]
+    result: Result, request: StripsRequest, ways: Sequence[Callable[[float], Result | None]]
 ) -> Result:
     """Divide strips that are larger than the sheet, and take more where rulings are too long.
 
@@ -65,31 +65,38 @@ def on_sheets(
     ----------
     result : Result
     request : StripsRequest
-    again : callable
-        Solves for a number of strips.
+    ways : sequence of callable
+        Each solves for strips of a largest width, in its own way.
 
     Returns
     -------
     Result
-        That with the smallest number of parts whose parts fit; that which was given, divided as
-        far as it can be, if none does.
+        That with the smallest number of parts whose parts fit and which is near enough; that which
+        was given, divided as far as it can be, if there is none.
     """
-    sheet, surface, options = request.sheet, result.ruled, request.options
-    if sheet is None or surface is None or not against_sheet(result, request):
+    sheet = request.sheet
+    if sheet is None or result.ruled is None or not against_sheet(result, request):
         return result
     tried = [divided(result, request)]
-    ends = surface.mesh.vertices[surface.rulings.edges]
-    longest = float(lengths(ends[:, 1] - ends[:, 0]).max(initial=0.0))
-    most = options.max_strips if options.number is None else 0
-    for limit in sorted(sheet, reverse=True):
-        least = max(int(np.ceil(surface.strips * longest / limit)), surface.strips + 1)
-        for count in range(least, min(least + _TRIES, most + 1)):
-            other = again(count)
+    for widest in sorted(sheet, reverse=True):
+        for way in ways if request.options.number is None else ():
+            other = way(_ROOM * widest)
             if other is not None:
                 tried.append(divided(other, request))
-                if not against_sheet(tried[-1], request):
-                    break
-    return min(tried, key=lambda one: (len(against_sheet(one, request)) > 0, _parts(one)))
+
+    def order(one: Result) -> tuple[bool, bool, int]:
+        return len(against_sheet(one, request)) > 0, one.status.is_failure, _parts(one)
+
+    return min(tried, key=order)
+
+
+def longest_ruling(result: Result) -> float:
+    """Return the length of the longest ruling; 0 without any."""
+    folds = result.rulings
+    if folds is None:
+        return 0.0
+    ends = result.mesh.vertices[folds.edges]
+    return float(lengths(ends[:, 1] - ends[:, 0]).max(initial=0.0))
 
 
 def _parts(result: Result) -> int:

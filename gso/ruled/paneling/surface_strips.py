@@ -205,7 +205,12 @@ def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
 
 
 def along_lines(
-    design: Mesh, request: StripsRequest, lines: LineStrips, *, most: int | None = None
+    design: Mesh,
+    request: StripsRequest,
+    lines: LineStrips,
+    *,
+    most: int | None = None,
+    narrow: tuple[int, float] | None = None,
 ) -> Result | None:
     """Make strips along the design's own lines, without a verdict; None where there are none.
 
@@ -217,10 +222,15 @@ def along_lines(
         Those of the design.
     most : int, optional
         Largest number of strips; 0 for the design as it is, where strips follow it exactly.
+    narrow : (int, float), optional
+        Number of the family of lines that they run along, and their largest width.
     """
     options, clock = request.options, time.perf_counter()
     aim = wanted(options, request.max_deviation, design.diagonal)
-    if most == 0:
+    if narrow is not None:
+        far = np.inf if aim.max_deviation is None else aim.max_deviation
+        found = lines.narrow(narrow[0], narrow[1] / design.diagonal, far)
+    elif most == 0:
         found = lines.as_it_is(aim)
     elif options.flats or (aim.strips == 1 and lines.predicted(1) > EXACT):
         found = None
