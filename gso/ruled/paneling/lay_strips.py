@@ -32,13 +32,13 @@ from gso.ruled.paneling.surface_strips import (
     lines_of,
     of_surface,
 )
+from gso.ruled.paneling.tried_strips import Tried
 from gso.seams import Edges, Segmentation, cut
 from gso.solver import Callback
-from gso.status import Status
 from gso.tasks import Limits
 from gso.tasks.start import Start
 from gso.typing import Ints, Keywords, MeshLike
-from gso.verdict import Code, Reason, crosses_itself, judge, ordered
+from gso.verdict import Reason, crosses_itself, judge, ordered
 
 
 def strips(
@@ -190,10 +190,10 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
     return result
 
 
-#: Distance relative to the diagonal at which strips need not be nearer.
-_CLOSE = 1e-4
 #: Share of the predicted distance that strips along lines may have.
 _FAR = 0.6
+#: Number of strips from which those along lines are nearer than others.
+_MANY = 8
 #: Ratio of the distance of pieces to the largest one from which other pieces are of no use.
 _HOPELESS = 2.0
 
@@ -253,7 +253,7 @@ class _Task:
             return self._answer(tried)
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
         if self.whole:
-            for way in (self._as_it_is, self._as_a_whole, self._along_lines):
+            for way in self._ways():
                 tried += way(light, tried)
                 if tried and tried[-1].ended:
                     return self._answer(tried)
@@ -280,6 +280,21 @@ class _Task:
             raise failed
         return self._answer(tried)
 
+    def _ways(self) -> tuple[Callable[[LightDesign, Sequence[Tried]], list[Tried]], ...]:
+        """Return the ways to make strips of the whole design, in order.
+
+        Many strips along lines are nearer than others by far: these are tried where they fail.
+        """
+        if self._many:
+            return self._as_it_is, self._along_lines, self._as_a_whole
+        return self._as_it_is, self._as_a_whole, self._along_lines
+
+    @property
+    def _many(self) -> bool:
+        """Whether many strips are asked for by their number."""
+        number = self.request.options.number
+        return number is not None and number >= _MANY
+
     def _divisions(self, light: LightDesign) -> Iterator[Callable[[], Pieces]]:
         """Return the ways to divide the design, those into fewer pieces first."""
         asked, given = self.request, self.division
@@ -291,19 +306,19 @@ class _Task:
         yield lambda: _without_darts(found_pieces(light, asked, 1.0))
         yield lambda: found_pieces(light, asked, JOINT)
 
-    def _out_of_reach(self, pieces: _Tried) -> bool:
+    def _out_of_reach(self, pieces: Tried) -> bool:
         """Return whether pieces are so far away that others do not hold the distance either."""
         allowed = self.request.max_deviation
         return allowed is not None and pieces.far > _HOPELESS * allowed
 
-    def _answer(self, tried: Sequence[_Tried]) -> Result:
+    def _answer(self, tried: Sequence[Tried]) -> Result:
         few = self.request.options.number is None
         best = min(tried, key=lambda one: one.order(few=few))
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         return best.result
 
-    def _developable(self) -> list[_Tried]:
+    def _developable(self) -> list[Tried]:
         """Return the design, if it is developable and its pieces were not given.
 
         Without a largest distance only designs with folds are kept, and none is opened that
@@ -317,11 +332,12 @@ class _Task:
         if result is None or not (asked.max_deviation or (folded and _is_whole(self.design))):
             return []
         reasons = judge(result, asked.limits)
-        return [_Tried(result, ordered([*reasons, *against_sheet(result, asked)]))]
+        return [Tried(result, ordered([*reasons, *against_sheet(result, asked)]))]
 
-    def _as_a_whole(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
+    def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request
-        if any(one.is_close for one in tried) or not _is_whole(light.mesh):
+        enough = any(one.is_close or (self._many and one.holds) for one in tried)
+        if enough or not _is_whole(light.mesh):
             return []
         asked.say("as a whole")
 
@@ -344,7 +360,7 @@ class _Task:
             own = judge(result, asked.limits, violation)
             reasons = ordered([*own, *against_sheet(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
-        return [_Tried(result, reasons)]
+        return [Tried(result, reasons)]
 
     @cached_property
     def _lines(self) -> LineStrips | None:
@@ -359,11 +375,11 @@ class _Task:
         """The smallest number of strips along lines; 0 where there are none."""
         return 0 if self._lines is None else self._lines.least
 
-    def _as_it_is(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
+    def _as_it_is(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         """Return strips that are the design itself, if there are any along its lines."""
         return [] if self._lines is None else self._of_lines(self._lines, 0)
 
-    def _along_lines(self, light: LightDesign, tried: Sequence[_Tried]) -> list[_Tried]:
+    def _along_lines(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         """Return strips along the design's own lines, if they may be better than the others."""
         lines, asked, most = self._lines, self.request, None
         if lines is None:
@@ -379,7 +395,7 @@ class _Task:
         asked.say("along its lines")
         return self._of_lines(lines, most)
 
-    def _of_lines(self, lines: LineStrips, most: int | None) -> list[_Tried]:
+    def _of_lines(self, lines: LineStrips, most: int | None) -> list[Tried]:
         asked = self.request
 
         def narrow(family: int, widest: float) -> Result | None:
@@ -391,56 +407,15 @@ class _Task:
         families = range(len(lines.choices))
         result = on_sheets(result, asked, [partial(narrow, k) for k in families])
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
-        return [_Tried(result, ordered([*own, *against_sheet(result, asked)]))]
+        return [Tried(result, ordered([*own, *against_sheet(result, asked)]))]
 
-    def _in_pieces(self, light: LightDesign, division: Pieces) -> _Tried:
+    def _in_pieces(self, light: LightDesign, division: Pieces) -> Tried:
         asked = self.request
         if division is self.division:
             light = LightDesign(self.design, self.design, asked.max_deviation)
         result, reasons = of_pieces(light, asked, division)
         result = divided(result, asked)
-        return _Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
-
-
-@dataclass(frozen=True)
-class _Tried:
-    """A result, and the reasons against it."""
-
-    result: Result
-    reasons: tuple[Reason, ...]
-
-    @property
-    def ended(self) -> bool:
-        """Whether the callback ended the solve."""
-        return self.result.status is Status.CANCELLED
-
-    @property
-    def holds(self) -> bool:
-        """Whether it is what was asked for."""
-        return not (self.reasons or self.result.status.is_failure)
-
-    def order(self, *, few: bool) -> tuple[bool, int, float]:
-        """Sort key: what was asked for first, fewer strips before more if asked, then distances."""
-        surface = self.result.ruled
-        count = surface.strips if few and self.holds and surface is not None else 0
-        return not self.holds, count, self.far
-
-    @property
-    def is_close(self) -> bool:
-        """Whether it is so close to the design that nothing nearer is looked for."""
-        return self.holds and self.far <= _CLOSE * self.result.design.diagonal
-
-    @property
-    def is_near(self) -> bool:
-        """Whether only the sheet is too small for its parts, so that these are to be divided."""
-        small = {Code.TOO_LONG, Code.TOO_WIDE}
-        return {why.code for why in self.reasons} <= small
-
-    @property
-    def far(self) -> float:
-        """The largest distance from the design; infinite without strips."""
-        surface = self.result.ruled
-        return np.inf if surface is None else surface.farthest
+        return Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
 
 
 def _read(given: MeshLike | Pieces) -> Mesh:

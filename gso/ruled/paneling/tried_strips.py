@@ -1,0 +1,55 @@
+"""Strips that were made in one way, and whether they are what was asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.result import Result
+from gso.status import Status
+from gso.verdict import Code, Reason
+
+#: Distance relative to the diagonal at which strips need not be nearer.
+_CLOSE = 1e-4
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A result, and the reasons against it."""
+
+    result: Result
+    reasons: tuple[Reason, ...]
+
+    @property
+    def ended(self) -> bool:
+        """Whether the callback ended the solve."""
+        return self.result.status is Status.CANCELLED
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is what was asked for."""
+        return not (self.reasons or self.result.status.is_failure)
+
+    def order(self, *, few: bool) -> tuple[bool, int, float]:
+        """Sort key: what was asked for first, fewer strips before more if asked, then distances."""
+        surface = self.result.ruled
+        count = surface.strips if few and self.holds and surface is not None else 0
+        return not self.holds, count, self.far
+
+    @property
+    def is_close(self) -> bool:
+        """Whether it is so close to the design that nothing nearer is looked for."""
+        return self.holds and self.far <= _CLOSE * self.result.design.diagonal
+
+    @property
+    def is_near(self) -> bool:
+        """Whether only the sheet is too small for its parts, so that these are to be divided."""
+        small = {Code.TOO_LONG, Code.TOO_WIDE}
+        return {why.code for why in self.reasons} <= small
+
+    @property
+    def far(self) -> float:
+        """The largest distance from the design; infinite without strips."""
+        surface = self.result.ruled
+        return np.inf if surface is None else surface.farthest
