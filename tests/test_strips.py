@@ -100,17 +100,22 @@ def test_a_closed_design_is_cut_into_pieces_without_darts(pieces, tmp_path):
     assert again.metrics == pytest.approx(result.metrics)
 
 
-def test_both_sides_of_a_seam_are_the_same(pieces):
-    result, _ = pieces
-    assert result.details["seam_gap"] == 0 and set(result.details["strips"]) == {1}
-    pattern = result.pattern
+def test_both_sides_of_a_seam_are_the_same():
+    halves = gso.cut(dome(9, height=0.3), gso.seams.Path([4, 76]))
+    result = gso.strips(halves, max_deviation="3%", **FAST)
+    assert result.usable, result.reasons
+    assert result.details["strips"] == [1, 1] and result.details["seam_gap"] == 0
+    pattern, points = result.pattern, result.mesh.vertices
+    label = pattern.mesh.components[pattern.seams[:, :, 0]]
+    assert (label[:, 0] != label[:, 1]).all()
+    # The seam runs from end to end of the design, without a gap.
+    ends = points[pattern.vertex[pattern.seams[:, 0]]]
+    assert np.ptp(ends.reshape(-1, 3), axis=0).max() > 0.95 * np.ptp(points, axis=0).max()
     sides = np.linalg.norm(np.diff(pattern.flat[pattern.seams], axis=2)[:, :, 0], axis=2)
-    np.testing.assert_allclose(sides[:, 0], sides[:, 1], atol=1e-12 * result.design.diagonal)
-    at = pattern.vertex[pattern.seams]
-    np.testing.assert_array_equal(at[:, 0], at[:, 1])
-    # Every part has lines to bend along, and no vertex inside.
+    np.testing.assert_allclose(sides[:, 0], sides[:, 1], rtol=1e-9)
+    # Both parts have lines to bend along, and no vertex inside.
     owner = pattern.mesh.components[result.folded.edges[:, 0]]
-    assert len(np.unique(owner)) == len(result.pieces)
+    assert len(np.unique(owner)) == 2
     assert pattern.mesh.half_edges.boundary_vertex.all()
 
 
@@ -141,6 +146,20 @@ def test_parts_fit_the_sheet():
     # They are next to each other, and all of the surface.
     whole = sum(part.area for part in split(result.mesh))
     assert sum(part.area for part in parts) == pytest.approx(whole, rel=1e-9)
+
+
+def test_pieces_on_a_sheet_keep_their_numbers():
+    t = np.linspace(0.0, np.pi / 2, 17)
+    arch = gso.as_mesh(np.stack(np.broadcast_arrays(np.cos(t), np.sin(t), 2 * t[:, None]), axis=-1))
+    halves = gso.cut(arch, gso.seams.Path([8 * 17, 8 * 17 + 16]))
+    result = gso.strips(halves, max_deviation="1%", sheet=(1.7, 0.7), **FAST)
+    assert result.usable, result.reasons
+    parts = split(result.pattern.mesh)
+    numbers = result.details["strips"]
+    assert len(numbers) == 2 and sum(numbers) == len(parts) == result.ruled.strips > 2
+    assert np.bincount(result.piece_of_face[[part.faces[0] for part in parts]]).tolist() == numbers
+    sizes = np.array([rectangle(result.pattern.flat[part.vertices])[1] for part in parts])
+    assert (sizes.max(axis=0) <= np.array([1.7, 0.7]) * (1 + 1e-9)).all()
 
 
 def test_a_closed_design_needs_a_distance():

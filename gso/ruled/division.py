@@ -20,8 +20,8 @@ from gso.typing import Array, Flags, Ints
 _STRAIGHT = 1e-4
 #: Pieces of faces below this area, relative to the squared diagonal, are left out.
 _SLIVER = 1e-10
-#: Area, relative to the squared diagonal, of faces whose corners are on a line, also beside all
-#: other parts of a pattern.
+#: Area, relative to the squared diagonal, of faces whose corners are on a line. It is larger than
+#: what meshes refuse, as the parts of a pattern are larger together than the design.
 _EMPTY = 1e-11
 
 

@@ -16,9 +16,9 @@ from gso.ruled.domain import Domain
 from gso.ruled.prices import prices
 from gso.typing import Array, Ints
 
-#: Cost of the squared length of a chord, relative to the square of the distance, over the number of
-#: points; and that of a triangle with three chords, relative to the longest of all chords.
-_FAIR, _BRANCH = 0.05, 4.0
+#: With n points and a distance d, a chord of length s costs _FAIR d^2 s^2 / n beside its price, and
+#: a triangle with three chords _FAIR _BRANCH d^2 s^2 / n with the longest of all chords.
+_FAIR, _BRANCH = 0.01, 100.0
 
 
 def outline_polygons(domain: Domain, corners: Ints, points: Array, near: float) -> list[Ints]:
@@ -33,7 +33,8 @@ def outline_polygons(domain: Domain, corners: Ints, points: Array, near: float) 
     points : ndarray, (n, 3)
         Where they are.
     near : float
-        Distance below which shorter chords are better than those along which normals vary less.
+        Distance from the design that is allowed: the larger it is, the more short chords are
+        preferred to those along which normals vary less.
 
     Returns
     -------
@@ -149,7 +150,8 @@ class _Costs:
         )
         ways = [(a, b, c), (a, c, d), (a, b, d), (b, c, d)]
         areas = [self._area(*way) for way in ways]
-        off = self._off(normals, ways)
+        # Across a triangle of a cylinder normals turn by about a third of that.
+        off = self._off(normals, ways, 1.0 / 3.0)
         area = areas[0] + areas[1]
         convex = np.min(areas, axis=0) > 0.05 * area
         return np.asarray(np.where(convex, area * (price + off * longest), np.inf))
@@ -158,10 +160,14 @@ class _Costs:
         u, v = self.flat[b] - self.flat[a], self.flat[c] - self.flat[a]
         return np.asarray(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
-    def _off(self, normals: list[Array], triangles: list[tuple[Ints, Ints, Ints]]) -> Array:
-        """Return how much normals differ from one another, and from those of triangles."""
+    def _off(
+        self, normals: list[Array], triangles: list[tuple[Ints, Ints, Ints]], share: float = 1.0
+    ) -> Array:
+        """Return a share of how much normals vary, and how much they differ from triangles'."""
         mean = unit(np.sum(normals, axis=0))
         varying = sum(((v - mean) ** 2).sum(axis=1) for v in normals) / len(normals)
         p = self.points
         own = [unit(cross(p[b] - p[a], p[c] - p[a])) for a, b, c in triangles]
-        return np.asarray(varying + sum(((v - mean) ** 2).sum(axis=1) for v in own) / len(own))
+        return np.asarray(
+            share * varying + sum(((v - mean) ** 2).sum(axis=1) for v in own) / len(own)
+        )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,10 +21,11 @@ _NEAR = 0.1
 
 def divided_to_fit(
     surface: RuledSurface, design: Mesh, fits: Callable[[Array], bool]
-) -> RuledSurface:
+) -> tuple[RuledSurface, Ints]:
     """Divide the strips that do not fit a sheet across, each into parts of equal length.
 
-    A strip stays where its rulings branch or close around, and where no division fits.
+    A strip stays where its rulings branch or close around, and where no division fits. All strips
+    stay where the outline of a polygon between two rulings has a hole.
 
     Parameters
     ----------
@@ -37,20 +37,23 @@ def divided_to_fit(
 
     Returns
     -------
-    RuledSurface
+    surface : RuledSurface
         The same surface with more strips, numbered in the order of those before; their joints are
         creases. The same object where nothing is divided.
+    faces : ndarray of int
+        For each joint, a face of the surface as it was given in the strip that it divides.
     """
     strips = _Strips.of(surface)
     if strips is None:
-        return surface
+        return surface, np.empty(0, np.int64)
     joints: list[_Joint] = []
     for part in range(int(strips.part.max()) + 1):
         cells = np.flatnonzero(strips.part == part)
         flat = surface.pattern.flat[np.concatenate([strips.rings[c] for c in cells])]
         if not fits(flat):
             joints += strips.divided(cells, fits)
-    return strips.joined(joints, design) if joints else surface
+    faces = strips.face[[joint.strip for joint in joints]]
+    return (strips.joined(joints, design) if joints else surface), faces
 
 
 #: A vertex of a pattern, or a place between two: both, and the share of the way.
@@ -63,11 +66,14 @@ class _Joint:
 
     Attributes
     ----------
+    strip : int
+        A polygon of the strip.
     cell : int
-        The polygon; -1 along a ruling.
+        The polygon that it divides; -1 along a ruling.
     one, two : _Place
     """
 
+    strip: int
     cell: int
     one: _Place
     two: _Place
@@ -82,6 +88,8 @@ class _Strips:
     surface : RuledSurface
     rings : list of ndarray of int
         Corners of the polygons, vertices of the pattern, anticlockwise.
+    face : ndarray of int, (p,)
+        The first face of each.
     part : ndarray of int, (p,)
         The part of the pattern that each is in.
     pairs : ndarray of int, (r, 2)
@@ -92,6 +100,7 @@ class _Strips:
 
     surface: RuledSurface
     rings: list[Ints]
+    face: Ints
     part: Ints
     pairs: Ints
     rulings: Ints
@@ -135,7 +144,8 @@ class _Strips:
         at = inner[hinge]
         pairs = np.stack([cell[he.face[at]], cell[he.face[he.twin[at]]]], axis=1)
         ends = np.stack([he.origin[at], he.dest[at]], axis=1)
-        return cls(surface, rings, np.unique(part[first], return_inverse=True)[1], pairs, ends)
+        part = np.unique(part[first], return_inverse=True)[1]
+        return cls(surface, rings, first, part, pairs, ends)
 
     def divided(self, cells: Ints, fits: Callable[[Array], bool]) -> list[_Joint]:
         """Return the joints of one strip: as few as there can be; none where nothing fits."""
@@ -153,24 +163,22 @@ class _Strips:
         whole = float(at[-1]) + ends[1]
         for count in range(2, 2 * len(path) + 1):
             wanted = whole * np.arange(1, count) / count
-            found = dict.fromkeys(self._place(hinges, path, at, place) for place in wanted.tolist())
-            if all(fits(points) for points in self._parts(path, hinges, list(found))):
-                return [joint for _, joint in found]
+            found = [self._joint(hinges, path, at, place) for place in wanted.tolist()]
+            joints = list(dict.fromkeys(found))
+            if all(fits(part) for part in self._parts(path, joints)):
+                return joints
         return []
 
-    def _place(self, hinges: Ints, path: Ints, at: Array, wanted: float) -> tuple[float, _Joint]:
-        """Return the position in the path, and the joint nearest to a distance from the begin."""
+    def _joint(self, hinges: Ints, path: Ints, at: Array, wanted: float) -> _Joint:
+        """Return the joint at a distance from the begin, or at a ruling near to it."""
         k = int(np.searchsorted(at, wanted))
         if 0 < k < len(at):
-            share = (wanted - at[k - 1]) / max(at[k] - at[k - 1], 1e-300)
+            share = float((wanted - at[k - 1]) / max(at[k] - at[k - 1], 1e-300))
             if _NEAR < share < 1.0 - _NEAR:
-                return k + float(share), self._between(
-                    int(path[k]), hinges[k - 1], hinges[k], share
-                )
+                return self._between(int(path[k]), int(hinges[k - 1]), int(hinges[k]), share)
             k -= int(share <= _NEAR)
-        k = min(k, len(at) - 1)
-        a, b = self.rulings[hinges[k]].tolist()
-        return k + 1.0, _Joint(-1, (a, a, 0.0), (b, b, 0.0))
+        a, b = self.rulings[hinges[min(k, len(at) - 1)]].tolist()
+        return _Joint(int(path[0]), -1, (a, a, 0.0), (b, b, 0.0))
 
     def _between(self, cell: int, before: int, after: int, share: float) -> _Joint:
         """Return the joint between two rulings of a polygon."""
@@ -182,50 +190,41 @@ class _Strips:
         mid = next(i for i in range(len(ring) - 1) if {ring[i], ring[i + 1]} == there)
         flat = self.surface.pattern.flat
         one = _along(flat, ring[: mid + 1], share)
-        return _Joint(cell, one, _along(flat, ring[mid + 1 :], 1.0 - share))
+        return _Joint(cell, cell, one, _along(flat, ring[mid + 1 :], 1.0 - share))
 
-    def _parts(self, path: Ints, hinges: Ints, joints: list[tuple[float, _Joint]]) -> list[Array]:
-        """Return the vertices (k, 2) of the parts between joints."""
+    def _parts(self, path: Ints, joints: list[_Joint]) -> list[Array]:
+        """Return the vertices (k, 2) of the parts between joints of a strip."""
         flat = self.surface.pattern.flat
-
-        def point(place: _Place) -> Array:
-            a, b, share = place
-            return np.asarray((1.0 - share) * flat[a] + share * flat[b])
-
-        out = []
-        bounds: list[tuple[float, _Joint | None]] = [(0.0, None), *joints, (float(len(path)), None)]
-        for (low, first), (high, last) in pairwise(bounds):
-            ids = [self.rings[path[k]] for k in range(int(np.ceil(low)), int(np.floor(high)))]
-            points = [flat[np.concatenate(ids)]] if ids else []
-            for joint in (first, last):
-                if joint is not None:
-                    points.append(np.stack([point(joint.one), point(joint.two)]))
-            # Corners between a joint inside a polygon and the next ruling.
-            for bound, hinge in ((low, int(np.ceil(low)) - 1), (high, int(np.floor(high)) - 1)):
-                if bound % 1.0 and 0 <= hinge < len(hinges):
-                    points.append(flat[self.rulings[hinges[hinge]]])
-            out.append(np.concatenate(points))
-        return out
+        nodes = _Nodes(flat, {int(c): self.rings[c].tolist() for c in path})
+        rings, lines = nodes.divided(np.arange(len(flat)), joints)
+        owner: dict[tuple[int, int], int] = {}
+        pairs = []
+        for number, ring in enumerate(rings):
+            for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
+                edge = (min(a, b), max(a, b))
+                if edge not in lines and owner.setdefault(edge, number) != number:
+                    pairs.append((owner[edge], number))
+        one, two = np.array(pairs, np.int64).reshape(-1, 2).T
+        label = topology.label_components(len(rings), one, two)
+        points = np.array(nodes.points)
+        return [
+            points[np.concatenate([rings[k] for k in np.flatnonzero(label == part)])]
+            for part in np.unique(label)
+        ]
 
     def joined(self, joints: list[_Joint], design: Mesh) -> RuledSurface:
         """Return the surface with joints."""
         surface, vertex = self.surface, self.surface.pattern.vertex
-        nodes = _Nodes(surface.mesh.vertices, [vertex[ring].tolist() for ring in self.rings])
-        lines = [(j.cell, nodes.at(vertex, j.one), nodes.at(vertex, j.two)) for j in joints]
-        nodes.insert()
-        rings = [[ring] for ring in nodes.rings]
-        joined = {(min(a, b), max(a, b)) for _, a, b in lines}
-        for cell, a, b in lines:
-            if cell >= 0:
-                rings[cell] = [half for ring in rings[cell] for half in _halves(ring, a, b)]
-        mesh_rulings = vertex[self.rulings]
-        kept = [tuple(sorted(e)) not in joined for e in mesh_rulings.tolist()]
-        every = [np.array(ring) for several in rings for ring in several]
+        own = {cell: vertex[ring].tolist() for cell, ring in enumerate(self.rings)}
+        nodes = _Nodes(surface.mesh.vertices, own)
+        rings, lines = nodes.divided(vertex, joints)
+        rulings = vertex[self.rulings]
+        kept = np.array([(min(a, b), max(a, b)) not in lines for a, b in rulings.tolist()], bool)
         none = np.empty((0, 3), np.int64)
         polygons = Polygons(
-            every,
-            np.zeros(len(every), np.int64),
-            mesh_rulings[np.array(kept, bool)],
+            [np.array(ring) for ring in rings],
+            np.zeros(len(rings), np.int64),
+            rulings[kept],
             none[:, :2],
             none,
             none,
@@ -236,25 +235,45 @@ class _Strips:
         )
 
 
-@dataclass
 class _Nodes:
     """Vertices and polygons, with new vertices on edges.
 
+    Parameters
+    ----------
+    vertices : ndarray, (n, 2) or (n, 3)
+    rings : dict of int to list of int
+        Corners of polygons, by the polygon's number.
+
     Attributes
     ----------
-    vertices : ndarray, (n, 3)
-    rings : list of list of int
-    points : list of ndarray, (3,)
+    points : list of ndarray
         All vertices, new ones at the end.
     """
 
-    vertices: Array
-    rings: list[list[int]]
-    points: list[Array] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.points = list(self.vertices)
+    def __init__(self, vertices: Array, rings: dict[int, list[int]]):
+        self.vertices, self.rings = vertices, rings
+        self.points: list[Array] = list(vertices)
         self._new: dict[tuple[int, int], dict[float, int]] = {}
+
+    def divided(
+        self, vertex: Ints, joints: list[_Joint]
+    ) -> tuple[list[list[int]], set[tuple[int, int]]]:
+        """Return the polygons with joints, and the joints as edges, the smaller vertex first.
+
+        Parameters
+        ----------
+        vertex : ndarray of int
+            For each vertex of the pattern, that of the polygons.
+        joints : list of _Joint
+        """
+        lines = [(j.cell, self.at(vertex, j.one), self.at(vertex, j.two)) for j in joints]
+        self.insert()
+        every = {cell: [ring] for cell, ring in self.rings.items()}
+        for cell, a, b in lines:
+            if cell >= 0:
+                every[cell] = [half for ring in every[cell] for half in _halves(ring, a, b)]
+        rings = [ring for several in every.values() for ring in several]
+        return rings, {(min(a, b), max(a, b)) for _, a, b in lines}
 
     def at(self, vertex: Ints, place: _Place) -> int:
         """Return the vertex at a place of the pattern."""
@@ -271,7 +290,7 @@ class _Nodes:
 
     def insert(self) -> None:
         """Insert the new vertices into all polygons with their edges."""
-        for ring in self.rings:
+        for ring in self.rings.values():
             out: list[int] = []
             for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
                 out.append(a)

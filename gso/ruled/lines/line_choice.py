@@ -136,7 +136,7 @@ def _costs(band: Band, places: Array, weight: float, widest: float) -> _Costs:
     cost = weight * _sagittas(places)
     if np.isfinite(widest):
         wide = [lengths(places - own) for own in places]
-        cost[np.nanmax(np.nan_to_num(wide), axis=2) > widest] = np.inf
+        cost[np.nan_to_num(wide).max(axis=2) > widest] = np.inf
     return _Costs(lines[levels], cost)
 
 

@@ -100,13 +100,16 @@ class LineStrips:
         Returns
         -------
         Found or None
-            None if there are no lines so close together.
+            None if there are no lines so close together, or none that are near, or the search was
+            ended.
         """
         choice = Choice(self.choices[number].family, widest)
-        every = (choice.lines(count) for count in range(1, choice.rows + 1))
+        most = 0 if self.stopped else choice.rows
+        every = (choice.lines(count) for count in range(1, most + 1))
         lines = next((found[0] for found in every if found is not None and found[1] <= aim), None)
         tried = [] if lines is None else self._settled(choice, lines, np.inf)
-        return min(tried, key=lambda found: found.order, default=None)
+        best = min(tried, key=lambda found: found.order, default=None)
+        return None if best is None else self._measure(best)
 
     def _solve(self, count: int) -> None:
         """Solve for a number of strips; their largest distance is that of samples."""
@@ -141,11 +144,14 @@ class LineStrips:
         found = self.results[count]
         # Samples do where strips are the mesh.
         if count not in self._measured and found.surface.farthest > _SAME:
-            far = found.surface.distances(self.mesh)
-            surface = replace(found.surface, deviation=far)
-            found = self.results[count] = replace(found, surface=surface, mean=far.mean)
+            found = self.results[count] = self._measure(found)
         self._measured.add(count)
         return found
+
+    def _measure(self, found: Found) -> Found:
+        """Return strips with the largest distance of all points."""
+        far = found.surface.distances(self.mesh)
+        return replace(found, surface=replace(found.surface, deviation=far), mean=far.mean)
 
     def as_it_is(self, wanted: Wanted) -> Found | None:
         """Return strips that are the mesh itself: the wanted number, or one; else None."""

@@ -73,8 +73,8 @@ def strips(
     close around. Where neither holds it, the design is cut into pieces without darts, which become
     developable together, and are divided by rulings between shared points of their seams. Where
     that does not hold the limits, each piece becomes strips that follow it. With a sheet, strips
-    are divided along rulings, so that parts fit. The result that holds the limits is returned, or
-    else the closest.
+    that are too long are divided across, but for those whose rulings branch. The result that
+    holds the limits is returned, or else the closest.
 
     Parameters
     ----------
@@ -283,7 +283,8 @@ class _Task:
     def _ways(self) -> tuple[Callable[[LightDesign, Sequence[Tried]], list[Tried]], ...]:
         """Return the ways to make strips of the whole design, in order.
 
-        Many strips along lines are nearer than others by far: these are tried where they fail.
+        Many strips along lines are far nearer than others, which are tried only where those along
+        lines fail.
         """
         if self._many:
             return self._as_it_is, self._along_lines, self._as_a_whole
@@ -348,8 +349,10 @@ class _Task:
         result = made(asked.options)
         count, longest = result.details.get("strips", 0), longest_ruling(result)
 
-        def narrow(widest: float) -> Result:
+        def narrow(widest: float) -> Result | None:
             more = max(int(np.ceil(count * longest / widest)), count + 1)
+            if more > asked.options.max_strips:
+                return None
             return made(replace(asked.options, strips=more))
 
         result = on_sheets(result, asked, [narrow])

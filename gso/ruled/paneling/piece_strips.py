@@ -93,7 +93,7 @@ def of_pieces(
     light : LightDesign
     request : StripsRequest
     division : Pieces
-        The pieces of the design. Those that a search found are developable already.
+        The pieces of the design.
 
     Returns
     -------
@@ -142,7 +142,8 @@ def _sharing_seams(
     """
     options, design, count = request.options, joint.design, len(joint.shape)
     near = _NEAR * design.diagonal if light.allowed is None else light.allowed
-    if options.number is not None or not all(piece.is_disk for piece in joint.shape):
+    disks = all(piece.is_disk for piece in joint.shape)
+    if options.number is not None or request.constraints or not disks or None in joint.sheets:
         return [], False
     stopped, tried = False, []
 
@@ -155,9 +156,14 @@ def _sharing_seams(
 
     request.say("rulings between seams")
     for side in _SIDES:
-        surface = of_shared_seams(target, joint.shape, joint.sheets, near, side, tell=told)
-        if surface is None:
+        try:
+            surface = of_shared_seams(target, joint.shape, joint.sheets, near, side, tell=told)
+        except GSOError:
+            continue
+        if stopped:
             break
+        if surface is None:
+            continue
         moved = Nearest(surface.mesh).locate(design.vertices)[2]
         surface = replace(surface, moved=moved, deviation=surface.distances(design, parts=True))
         if light.allowed is None and surface.farthest > near:

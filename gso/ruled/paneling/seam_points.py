@@ -15,7 +15,7 @@ from gso.typing import Array, Flags, Ints
 _SHARP = 35.0
 #: Least number of points on a curve that closes.
 _CLOSED = 6
-#: Inverse of the distance along the surface of a seam from its chords, relative to their length.
+#: Ratio of the distance between points to how far a seam may be from its chords on the surface.
 _SIDEWAYS = 2.0
 #: Ratio of successive numbers of points of a curve.
 _MORE = 1.25
@@ -48,14 +48,15 @@ def seam_points(pieces: Pieces, within: float, side: int) -> tuple[Flags, Ints]:
     chosen = np.zeros(len(mesh.vertices), bool)
     smooth = [np.empty((0, 3), np.int64)]
     normals = vertex_normals(mesh)
-    for (side, _), chain in chains(edges, sides):
+    degree = np.bincount(edges.ravel(), minlength=len(mesh.vertices))
+    for (first, _), chain in chains(edges, sides):
         # Where a seam runs on the surface is free, where the outline runs is not.
-        outer = side < 0
+        outer = first < 0
         for curve in _smooth_curves(chain, mesh.vertices) if outer else [chain]:
             ways = None if outer else normals[curve]
             kept = curve[_spaced(mesh.vertices[curve], ways, step, within)]
             chosen[kept] = True
-            if kept[0] == kept[-1]:
+            if kept[0] == kept[-1] and degree[kept[0]] == 2 and _is_smooth(mesh.vertices[kept]):
                 kept = np.r_[kept, kept[1]]
             smooth.append(np.stack([kept[:-2], kept[1:-1], kept[2:]], axis=1))
     return chosen, np.concatenate(smooth)
@@ -73,6 +74,12 @@ def _smooth_curves(chain: Ints, vertices: Array) -> list[Ints]:
         chain = np.r_[chain, chain[0]]
     sharp[0] = False
     return [np.asarray(c) for c in _divided(chain, np.flatnonzero(sharp))]
+
+
+def _is_smooth(points: Array) -> bool:
+    """Return whether a closed curve has no corner where it begins."""
+    way = unit(np.stack([points[-1] - points[-2], points[1] - points[0]]))
+    return float(turns(way)[1]) <= _SHARP
 
 
 def _divided(chain: Ints, corners: Ints) -> list[Ints]:

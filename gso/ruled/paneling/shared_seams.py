@@ -12,6 +12,7 @@ import numpy as np
 
 from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
+from gso.mesh.topology import pair_keys
 from gso.ruled.domain import Domain
 from gso.ruled.lines.line_fit import LineFitter
 from gso.ruled.lines.line_surface import line_surface
@@ -57,15 +58,17 @@ def of_shared_seams(
     Returns
     -------
     RuledSurface or None
-        None where a piece has no pattern, or cannot be divided by rulings, or `tell` ended it.
+        None where a piece has no pattern, meets itself at a seam, or cannot be divided by rulings,
+        and where `tell` ended it.
     """
     size, centre = design.diagonal, design.frame.centre
-    unit = shape.design.replaced((shape.design.vertices - centre) / size)
+    scaled = shape.design.replaced((shape.design.vertices - centre) / size)
     chosen, smooth = seam_points(shape, _CHORD * allowed, side)
     rings: list[Ints] = []
     strip: list[int] = []
+    borders: list[Ints] = []
     for k, piece in enumerate(shape):
-        mesh = piece.mesh.replaced(unit.vertices[piece.vertices])
+        mesh = piece.mesh.replaced(scaled.vertices[piece.vertices])
         sheet = sheets[k]
         if sheet is None or not tell(k):
             return None
@@ -75,27 +78,25 @@ def of_shared_seams(
         own = outline_polygons(domain, corners, mesh.vertices[corners], allowed / size)
         if not own:
             return None
-        rings += [piece.vertices[corners[ring]] for ring in own]
+        own = [piece.vertices[corners[ring]] for ring in own]
+        if any(len(np.unique(ring)) < len(ring) for ring in own):
+            return None
+        rings += own
+        around = piece.vertices[corners]
+        borders.append(np.stack([around, np.roll(around, -1)], axis=1))
         strip += [k] * len(own)
-    polygons = _polygons(rings, np.array(strip), smooth)
+    polygons = _polygons(rings, np.array(strip), np.concatenate(borders), smooth)
     target = design.replaced((design.vertices - centre) / size)
-    points = LineFitter(target).fit(polygons, unit.vertices, tangential=_TANGENTIAL)
+    points = LineFitter(target).fit(polygons, scaled.vertices, tangential=_TANGENTIAL)
     surface = line_surface(target, polygons, points)
     return surface.transformed(lambda x: size * x + centre, size, lambda rows: rows)
 
 
-def _polygons(rings: list[Ints], strip: Ints, smooth: Ints) -> Polygons:
-    """Join the polygons of pieces."""
-    size = np.array([len(ring) for ring in rings])
-    owner = np.repeat(np.arange(len(rings)), size)
-    ends = np.stack(
-        [np.concatenate(rings), np.concatenate([np.roll(ring, -1) for ring in rings])], axis=1
-    )
-    edges, first, which, count = np.unique(
-        np.sort(ends, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
-    last = np.empty(len(edges), np.int64)
-    last[which.ravel()] = np.arange(len(ends))
-    inner, same = count == 2, strip[owner[first]] == strip[owner[last]]
+def _polygons(rings: list[Ints], strip: Ints, borders: Ints, smooth: Ints) -> Polygons:
+    """Join the polygons of pieces; edges on the outlines of pieces (b, 2) are no rulings."""
+    ends = np.concatenate([np.stack([ring, np.roll(ring, -1)], axis=1) for ring in rings])
+    edges, count = np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
+    n = int(edges.max()) + 1
+    border = np.isin(pair_keys(edges, n), pair_keys(borders, n))
     none = np.empty((0, 3), np.int64)
-    return Polygons(rings, strip, edges[inner & same], edges[inner & ~same], smooth, none)
+    return Polygons(rings, strip, edges[~border], edges[border & (count == 2)], smooth, none)

@@ -13,6 +13,7 @@ from gso.geometry.vectors import lengths
 from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.sheet_division import divided_to_fit
+from gso.status import Status
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare
 
@@ -32,27 +33,32 @@ def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
 
 
 def divided(result: Result, request: StripsRequest) -> Result:
-    """Return strips divided along rulings where parts are larger than the sheet."""
+    """Return strips divided across where parts are larger than the sheet, if all have rulings."""
     sheet = request.sheet
-    if sheet is None or not isinstance(result, StripsResult):
+    pattern = result.pattern
+    if sheet is None or pattern is None or not isinstance(result, StripsResult):
+        return result
+    before = result.details["strips"]
+    if isinstance(before, list) and 0 in before:
         return result
 
     def fits(flat: Array) -> bool:
         long, wide = rectangle(flat)[1]
         return bool(long <= max(sheet) and wide <= min(sheet))
 
-    surface = divided_to_fit(result.ruled, result.design, fits)
+    surface, faces = divided_to_fit(result.ruled, result.design, fits)
     if surface is result.ruled:
         return result
     numbers: int | list[int] = surface.strips
-    if isinstance(result.details["strips"], list):
+    if isinstance(before, list):
+        # Of each piece: the parts before, and one more for each joint.
         owner = result.piece_of_face
-        numbers = [
-            len(np.unique(surface.strip[owner == k])) if before else 0
-            for k, before in enumerate(result.details["strips"])
-        ]
+        parts = [owner[part.faces[0]] for part in split(pattern.mesh)]
+        every = np.concatenate([parts, owner[faces]]).astype(np.int64)
+        numbers = np.bincount(every, minlength=len(before)).tolist()
     made = replace(result, **StripsResult.attributes(surface))
     made.details = result.details | {"strips": numbers}
+    made.notes = (*result.notes, "strips are divided across, so that parts fit the sheet")
     return made
 
 
@@ -71,16 +77,21 @@ def on_sheets(
     Returns
     -------
     Result
-        That with the smallest number of parts whose parts fit and which is near enough; that which
-        was given, divided as far as it can be, if there is none.
+        That with the smallest number of parts among those whose parts fit and that are near
+        enough, or else that with the fewest parts.
     """
     sheet = request.sheet
-    if sheet is None or result.ruled is None or not against_sheet(result, request):
+    large = result.ruled is not None and len(against_sheet(result, request)) > 0
+    if sheet is None or not large or result.status is Status.CANCELLED:
         return result
     tried = [divided(result, request)]
-    for widest in sorted(sheet, reverse=True):
-        for way in ways if request.options.number is None else ():
+    # A number that was named stays, and without a distance there is one strip.
+    free = request.options.number is None and request.max_deviation is not None
+    for widest in sorted(sheet, reverse=True) if free else ():
+        for way in ways:
             other = way(_ROOM * widest)
+            if other is not None and other.status is Status.CANCELLED:
+                return replace(tried[0], status=Status.CANCELLED)
             if other is not None:
                 tried.append(divided(other, request))
 
