@@ -54,8 +54,8 @@ class RuledSurface:
     crossed : int
         Number of pairs of successive rulings that cross.
     untrimmed : Untrimmed or None
-        The strips that it was cut out of; None for strips along lines of the design, which are not
-        cut, and in files of earlier versions.
+        The strips that it was cut out of; None for strips along lines of the design and between
+        seams, which are not cut, for those divided for a sheet, and in files of earlier versions.
     deviation : Distances or None
         Its distances from the design, where they are known; see :meth:`distances`.
     strain : float or None

@@ -1,4 +1,4 @@
-"""Strips on sheets: divided along rulings, or more of them, so that every part fits."""
+"""Strips on sheets: divided across, or more of them, so that every part fits."""
 
 from __future__ import annotations
 
