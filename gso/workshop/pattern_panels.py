@@ -80,7 +80,10 @@ def of_result(name: str, result: Result, record: Json) -> Made:
     if pieces is not None:
         first = [np.flatnonzero(label[pattern.faces[:, 0]] == k)[0] for k in range(len(panels))]
         owner = result.piece_of_face[first].tolist()
-        matings += across(pieces, owner, panels, _rims(panels, pattern, label, local))
+        sides = np.array(owner)[label[pattern.seams[:, :, 0]]]
+        # Pieces that share the points of their seams are joined in the pattern already.
+        if not (sides[:, 0] != sides[:, 1]).any():
+            matings += across(pieces, owner, panels, _rims(panels, pattern, label, local))
         if len(pieces) > 1:
             names = [f"{name}-{pieces.name(k)}" for k in owner]
     return Made(name, _named(panels, names), numbered(matings), record)
