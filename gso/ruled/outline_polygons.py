@@ -59,8 +59,10 @@ class _Costs:
         Prices of chords; zero for sides of the outline.
     normal : ndarray, (n, n, 3)
         Mean normals of the design along chords.
+    square : ndarray, (n, n)
+        Their squared lengths.
     length : ndarray, (n, n)
-        Costs of chords by their length.
+        Their costs by length.
     branch : float
         Cost of a triangle with three chords.
     """
@@ -69,6 +71,7 @@ class _Costs:
     points: Array
     price: Array
     normal: Array
+    square: Array
     length: Array
     branch: float
 
@@ -84,7 +87,7 @@ class _Costs:
         fair = _FAIR * near**2
         length = fair / n * np.where(side > 1, square, 0.0)
         branch = fair * _BRANCH * float(square.max()) / n
-        return cls(flat, points, price, normal, length, branch)
+        return cls(flat, points, price, normal, square, length, branch)
 
     def cheapest(self) -> list[Ints]:
         """Return the polygons of least total cost."""
@@ -137,7 +140,7 @@ class _Costs:
         pairs = ((a, b), (b, c), (a, c))
         price = sum(self.price[p, q] for p, q in pairs) / 3.0
         normals = [self.normal[p, q] for p, q in pairs]
-        longest = np.maximum.reduce([((self.flat[p] - self.flat[q]) ** 2).sum(1) for p, q in pairs])
+        longest = np.maximum.reduce([self.square[p, q] for p, q in pairs])
         area = self._area(a, b, c)
         off = self._off(normals, [(a, b, c)])
         return np.asarray(np.where(area > 0, area * (price + off * longest), np.inf))
@@ -145,9 +148,7 @@ class _Costs:
     def _quads(self, a: Ints, b: Ints, c: Ints, d: Ints) -> Array:
         price = 0.5 * (self.price[a, d] + self.price[b, c])
         normals = [self.normal[a, d], self.normal[b, c]]
-        longest = np.maximum.reduce(
-            [((self.flat[p] - self.flat[q]) ** 2).sum(1) for p, q in ((a, c), (b, d))]
-        )
+        longest = np.maximum(self.square[a, c], self.square[b, d])
         ways = [(a, b, c), (a, c, d), (a, b, d), (b, c, d)]
         areas = [self._area(*way) for way in ways]
         # Across a triangle of a cylinder normals turn by about a third of that.

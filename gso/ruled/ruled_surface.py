@@ -121,6 +121,14 @@ class RuledSurface:
         at = at[found]
         return Folded(ends[found], self.rulings.angles[at], self.rulings.radii[at])
 
+    def on(self, design: Mesh, *, parts: bool = False) -> RuledSurface:
+        """Return the surface with a design's vertices moved to it, and its distances from it.
+
+        See :meth:`distances` for `parts`.
+        """
+        moved = Nearest(self.mesh).locate(design.vertices)[2]
+        return replace(self, moved=moved, deviation=self.distances(design, parts=parts))
+
     @property
     def bends(self) -> list[Bend]:
         """The rulings in the pattern, as lines."""

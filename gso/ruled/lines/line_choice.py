@@ -8,7 +8,8 @@ of the curvature across.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,10 +36,19 @@ class _Costs:
         The line at each level; -1 where the band ends.
     cost : ndarray, (n + 1, n + 1)
         Cost of the strip between two levels.
+    places : ndarray, (n + 1, c, 3)
+        Positions on the levels; not a number where there are none.
     """
 
     levels: Ints
     cost: Array
+    places: Array
+
+    def narrower(self, widest: float) -> _Costs:
+        """Return the costs without strips that are wider."""
+        wide = [lengths(self.places - own) for own in self.places]
+        too_wide = np.nan_to_num(wide).max(axis=2) > widest
+        return replace(self, cost=np.where(too_wide, np.inf, self.cost))
 
     def best(self, most: int) -> tuple[Array, list[Ints]]:
         """Return costs (most,) and lines for 1 to `most` strips; infinite where there are none."""
@@ -66,19 +76,24 @@ class Choice:
     Parameters
     ----------
     family : Family
-    widest : float
-        Largest width of a strip.
     """
 
-    def __init__(self, family: Family, widest: float = np.inf):
+    def __init__(self, family: Family):
         self.family = family
         places = [_places(family, band) for band in family.bands]
         weight = 1.0 / max(sum(int(np.isfinite(p[:, :, 0]).sum()) for p in places), 1)
         self._costs = [
-            _costs(band, p, weight, widest) for band, p in zip(family.bands, places, strict=True)
+            _costs(band, p, weight) for band, p in zip(family.bands, places, strict=True)
         ]
         self._known: dict[int, tuple[Ints, float] | None] = {}
         self._far: dict[bytes, float] = {}
+
+    def narrower(self, widest: float) -> Choice:
+        """Return the choice among strips that are at most so wide."""
+        other = copy(self)
+        other._costs = [costs.narrower(widest) for costs in self._costs]
+        other._known, other._far = {}, {}
+        return other
 
     @property
     def least(self) -> int:
@@ -126,18 +141,14 @@ class Choice:
         return picked, far
 
 
-def _costs(band: Band, places: Array, weight: float, widest: float) -> _Costs:
+def _costs(band: Band, places: Array, weight: float) -> _Costs:
     """Return the costs of the strips of a band, on some of its levels if there are many."""
     lines = np.r_[-1, band.lines[: len(band.rows) - 1], -1]
     if band.closed:
         lines[[0, -1]] = band.lines[-1]
     levels = np.unique(np.linspace(0, len(lines) - 1, min(len(lines), _LEVELS)).round().astype(int))
     places = places[levels]
-    cost = weight * _sagittas(places)
-    if np.isfinite(widest):
-        wide = [lengths(places - own) for own in places]
-        cost[np.nan_to_num(wide).max(axis=2) > widest] = np.inf
-    return _Costs(lines[levels], cost)
+    return _Costs(lines[levels], weight * _sagittas(places), places)
 
 
 def _places(family: Family, band: Band) -> Array:

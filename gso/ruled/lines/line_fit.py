@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -66,6 +67,12 @@ class LineFitter:
         share = np.zeros(len(mesh.vertices))
         np.add.at(share, mesh.triangles.ravel(), np.repeat(area, 3) / (3.0 * area.sum()))
         self.share = share
+
+    @cached_property
+    def _lines(self) -> Polylines:
+        """The design's outline, if it has one."""
+        v = self.mesh.vertices
+        return Polylines.join([Polylines.of(v[loop], closed=True) for loop in self._loops])
 
     def fit(
         self,
@@ -159,7 +166,6 @@ class LineFitter:
         if not self._loops:
             return []
         v = self.mesh.vertices
-        lines = Polylines.join([Polylines.of(v[loop], closed=True) for loop in self._loops])
         rim = number[np.concatenate(self._loops)]
         rim = rim[rim >= 0]
         share = 1.0 / len(rim)
@@ -167,7 +173,7 @@ class LineFitter:
         corners = position(number[kept], v[kept], np.full(len(kept), share))
         return [
             Weighted(corners, _CORNERS),
-            Weighted(curve(rim, lines, weight=share), _OUTLINE),
+            Weighted(curve(rim, self._lines, weight=share), _OUTLINE),
         ]
 
     def _facing(self, polygons: Polygons, number: Ints, v: Array) -> Term:

@@ -103,7 +103,7 @@ class LineStrips:
             None if there are no lines so close together, or none that are near, or the search was
             ended.
         """
-        choice = Choice(self.choices[number].family, widest)
+        choice = self.choices[number].narrower(widest)
         most = 0 if self.stopped else choice.rows
         every = (choice.lines(count) for count in range(1, most + 1))
         lines = next((found[0] for found in every if found is not None and found[1] <= aim), None)

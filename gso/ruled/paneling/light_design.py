@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gso import decimation
-from gso.mesh import Mesh, Nearest
+from gso.mesh import Mesh
 from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import wanted
@@ -45,9 +45,7 @@ class LightDesign:
             return result
         if not isinstance(result, StripsResult):
             return replace(result, design=self.design, mesh=self.design, flat=None, pattern=None)
-        surface = result.ruled
-        moved = Nearest(surface.mesh).locate(self.design.vertices)[2]
-        surface = replace(surface, moved=moved, deviation=surface.distances(self.design))
+        surface = result.ruled.on(self.design)
         status = result.status
         if status is not Status.CANCELLED:
             met = wanted(request.options, request.max_deviation, 1.0).met(surface)

@@ -13,14 +13,14 @@ from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import GSOError, MeshError
 from gso.executors import open_executor
-from gso.mesh import Mesh, Nearest
+from gso.mesh import Mesh
 from gso.pattern import Pattern
 from gso.pipeline.component_results import renumber, worst_status
 from gso.result import Result, StripsResult
 from gso.ruled.fold_lines import Folds
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import RULED, Options
-from gso.ruled.paneling.shared_seams import of_shared_seams
+from gso.ruled.paneling.shared_seams import SharedSeams
 from gso.ruled.paneling.strips_request import StripsRequest, silent
 from gso.ruled.paneling.surface_strips import check_whole, of_surface, wanted
 from gso.ruled.ruled_surface import RuledSurface
@@ -32,7 +32,6 @@ from gso.seams.joint_solve import gap, solve_pieces
 from gso.seams.segmentation import Segmentation
 from gso.seams.sheets import flattened
 from gso.solver import Callback
-from gso.solver.minimiser import says_no
 from gso.status import Progress, Status
 from gso.tasks import Limits, check
 from gso.tasks.start import Start
@@ -143,7 +142,14 @@ def _sharing_seams(
     options, design, count = request.options, joint.design, len(joint.shape)
     near = _NEAR * design.diagonal if light.allowed is None else light.allowed
     disks = all(piece.is_disk for piece in joint.shape)
-    if options.number is not None or request.constraints or not disks or None in joint.sheets:
+    if options.number is not None or request.constraints or not disks:
+        return [], False
+    sheets = [sheet for sheet in joint.sheets if sheet is not None]
+    if len(sheets) < count:
+        return [], False
+    try:
+        shared = SharedSeams(target, joint.shape, sheets, near)
+    except GSOError:
         return [], False
     stopped, tried = False, []
 
@@ -151,21 +157,20 @@ def _sharing_seams(
         nonlocal stopped
         name = f"piece {number + 1} of {count}: rulings"
         progress = Progress(number, count, 0, 1, 0.0, {}, 1.0, name)
-        stopped = request.callback is not None and says_no(request.callback(progress))
+        stopped = not request.goes_on(progress)
         return not stopped
 
     request.say("rulings between seams")
     for side in _SIDES:
         try:
-            surface = of_shared_seams(target, joint.shape, joint.sheets, near, side, tell=told)
+            surface = shared.surface(side, told)
         except GSOError:
             continue
         if stopped:
             break
         if surface is None:
             continue
-        moved = Nearest(surface.mesh).locate(design.vertices)[2]
-        surface = replace(surface, moved=moved, deviation=surface.distances(design, parts=True))
+        surface = surface.on(design, parts=True)
         if light.allowed is None and surface.farthest > near:
             continue
         met = wanted(options, request.max_deviation, 1.0).met(surface)

@@ -21,7 +21,7 @@ from gso.ruled.outline_polygons import outline_polygons
 from gso.ruled.paneling.seam_points import seam_points
 from gso.ruled.ruled_surface import RuledSurface
 from gso.seams.sheets import Sheet
-from gso.typing import Ints
+from gso.typing import Array, Ints
 
 #: Factor on tangential displacements.
 _TANGENTIAL = 0.1
@@ -29,67 +29,80 @@ _TANGENTIAL = 0.1
 _CHORD = 0.1
 
 
-def of_shared_seams(
-    design: Mesh,
-    shape: Pieces,
-    sheets: Sequence[Sheet | None],
-    allowed: float,
-    side: int,
-    *,
-    tell: Callable[[int], bool] = lambda number: True,
-) -> RuledSurface | None:
-    """Make a ruled surface of each piece, with shared seams; rulings may branch at flat triangles.
+class SharedSeams:
+    """Ruled surfaces of pieces with shared seams; rulings may branch at flat triangles.
 
     Parameters
     ----------
     design : Mesh
-        What the surface is near, with the vertices of the pieces' design.
+        What the surfaces are near, with the vertices of the pieces' design.
     shape : Pieces
         Pieces that are nearly developable, all of them disks.
-    sheets : sequence of Sheet or None
+    sheets : sequence of Sheet
         The flat patterns of the pieces.
     allowed : float
         Distance from the design.
-    side : int
-        Number of points on the sides of a square of the pieces' mean area.
-    tell : callable
-        Told the number of each piece; returning False ends the search for rulings.
-
-    Returns
-    -------
-    RuledSurface or None
-        None where a piece has no pattern, meets itself at a seam, or cannot be divided by rulings,
-        and where `tell` ended it.
     """
-    size, centre = design.diagonal, design.frame.centre
-    scaled = shape.design.replaced((shape.design.vertices - centre) / size)
-    chosen, smooth = seam_points(shape, _CHORD * allowed, side)
-    rings: list[Ints] = []
-    strip: list[int] = []
-    borders: list[Ints] = []
-    for k, piece in enumerate(shape):
-        mesh = piece.mesh.replaced(scaled.vertices[piece.vertices])
-        sheet = sheets[k]
-        if sheet is None or not tell(k):
+
+    def __init__(self, design: Mesh, shape: Pieces, sheets: Sequence[Sheet], allowed: float):
+        self._shape, self._allowed = shape, allowed
+        self._size, self._centre = design.diagonal, design.frame.centre
+        self._start = self._scaled(shape.design.vertices)
+        self._target = design.replaced(self._scaled(design.vertices))
+        self._fitter = LineFitter(self._target)
+        self._pieces = list(shape)
+        self._domains = [
+            Domain(piece.mesh.replaced(self._start[piece.vertices]), sheet.flat / self._size)
+            for piece, sheet in zip(self._pieces, sheets, strict=True)
+        ]
+        self._tried: set[bytes] = set()
+
+    def _scaled(self, points: Array) -> Array:
+        return (points - self._centre) / self._size
+
+    def surface(self, side: int, tell: Callable[[int], bool]) -> RuledSurface | None:
+        """Make a ruled surface of each piece, between points that were not tried before.
+
+        Parameters
+        ----------
+        side : int
+            Number of points on the sides of a square of the pieces' mean area.
+        tell : callable
+            Told the number of each piece; returning False ends the search for rulings.
+
+        Returns
+        -------
+        RuledSurface or None
+            None where a piece meets itself at a seam, or cannot be divided by rulings, where the
+            points are those of another number, and where `tell` ended it.
+        """
+        chosen, smooth = seam_points(self._shape, _CHORD * self._allowed, side)
+        if chosen.tobytes() in self._tried:
             return None
-        domain = Domain(mesh, sheet.flat / size)
-        loop = domain.outline
-        corners = loop[chosen[piece.vertices[loop]]]
-        own = outline_polygons(domain, corners, mesh.vertices[corners], allowed / size)
-        if not own:
-            return None
-        own = [piece.vertices[corners[ring]] for ring in own]
-        if any(len(np.unique(ring)) < len(ring) for ring in own):
-            return None
-        rings += own
-        around = piece.vertices[corners]
-        borders.append(np.stack([around, np.roll(around, -1)], axis=1))
-        strip += [k] * len(own)
-    polygons = _polygons(rings, np.array(strip), np.concatenate(borders), smooth)
-    target = design.replaced((design.vertices - centre) / size)
-    points = LineFitter(target).fit(polygons, scaled.vertices, tangential=_TANGENTIAL)
-    surface = line_surface(target, polygons, points)
-    return surface.transformed(lambda x: size * x + centre, size, lambda rows: rows)
+        self._tried.add(chosen.tobytes())
+        rings: list[Ints] = []
+        strip: list[int] = []
+        borders: list[Ints] = []
+        for k, (piece, domain) in enumerate(zip(self._pieces, self._domains, strict=True)):
+            if not tell(k):
+                return None
+            loop = domain.outline
+            corners = loop[chosen[piece.vertices[loop]]]
+            points = domain.mesh.vertices[corners]
+            around = piece.vertices[corners]
+            own = outline_polygons(domain, corners, points, self._allowed / self._size)
+            own = [around[ring] for ring in own]
+            if not own or any(len(np.unique(ring)) < len(ring) for ring in own):
+                return None
+            rings += own
+            borders.append(np.stack([around, np.roll(around, -1)], axis=1))
+            strip += [k] * len(own)
+        polygons = _polygons(rings, np.array(strip), np.concatenate(borders), smooth)
+        points = self._fitter.fit(polygons, self._start, tangential=_TANGENTIAL)
+        surface = line_surface(self._target, polygons, points)
+        return surface.transformed(
+            lambda x: self._size * x + self._centre, self._size, lambda rows: rows
+        )
 
 
 def _polygons(rings: list[Ints], strip: Ints, borders: Ints, smooth: Ints) -> Polygons:

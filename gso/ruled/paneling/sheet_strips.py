@@ -26,8 +26,12 @@ def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     pattern, sheet = result.pattern, request.sheet
     if pattern is None or sheet is None:
         return ()
-    sizes = [rectangle(pattern.flat[part.vertices])[1] for part in split(pattern.mesh)]
-    long, wide = np.array(sizes).T
+    return _too_large([pattern.flat[part.vertices] for part in split(pattern.mesh)], sheet)
+
+
+def _too_large(parts: Sequence[Array], sheet: tuple[float, float]) -> tuple[Reason, ...]:
+    """Return the reasons if parts with vertices (k, 2) do not fit a sheet."""
+    long, wide = np.array([rectangle(flat)[1] for flat in parts]).T
     measured = {Code.TOO_LONG: Measurement(long), Code.TOO_WIDE: Measurement(wide)}
     return compare(measured, {Code.TOO_LONG: max(sheet), Code.TOO_WIDE: min(sheet)})
 
@@ -43,8 +47,7 @@ def divided(result: Result, request: StripsRequest) -> Result:
         return result
 
     def fits(flat: Array) -> bool:
-        long, wide = rectangle(flat)[1]
-        return bool(long <= max(sheet) and wide <= min(sheet))
+        return not _too_large([flat], sheet)
 
     surface, faces = divided_to_fit(result.ruled, result.design, fits)
     if surface is result.ruled:

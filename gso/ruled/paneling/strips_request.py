@@ -11,6 +11,8 @@ from gso.constraints import Constraint
 from gso.ruled.paneling.options import Options
 from gso.seams.options import CHANGES
 from gso.solver import Callback
+from gso.solver.minimiser import says_no
+from gso.status import Progress
 from gso.tasks import Limits
 from gso.tasks.start import Start
 from gso.typing import Ints
@@ -73,6 +75,10 @@ class StripsRequest:
         """Largest strain of pieces that no strips follow, which keep their joint pattern."""
         given = self.limits.max_strain
         return CHANGES if given is None else given
+
+    def goes_on(self, progress: Progress) -> bool:
+        """Tell the callback about progress, and return whether it does not end the solve."""
+        return self.callback is None or not says_no(self.callback(progress))
 
     @property
     def may_leave_pieces(self) -> bool:

@@ -24,7 +24,6 @@ from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.solve import Found, Wanted, solve
 from gso.ruled.strip_mirror import Mirror
-from gso.solver.minimiser import says_no
 from gso.status import Progress, Status
 from gso.tasks.base import Solution
 from gso.tasks.developable import Options as DevelopableOptions
@@ -117,7 +116,7 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
     def told(iteration: int, iterations: int, energy: float, count: int) -> bool:
         nonlocal stopped
         progress = Progress(0, 1, iteration, iterations, energy, {}, 1.0, f"strips: {count}")
-        stopped = request.callback is not None and says_no(request.callback(progress))
+        stopped = not request.goes_on(progress)
         return not stopped
 
     found, tried = solve(domain, starts or {"design": domain.normals}, aim, told, conditions)
@@ -199,7 +198,7 @@ def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
 
     def told(count: int) -> bool:
         progress = Progress(0, 1, 0, 1, 0.0, {}, 1.0, f"strips along lines: {count}")
-        return request.callback is None or not says_no(request.callback(progress))
+        return request.goes_on(progress)
 
     return LineStrips(design.replaced((design.vertices - centre) / size), told)
 
