@@ -276,3 +276,38 @@ def test_the_nearer_strips_are_returned():
     lines = LineStrips(scaled(design)).strips(3).surface
     result = gso.strips(design, strips=3)
     assert result.ruled.farthest <= lines.farthest * design.diagonal * (1 + 1e-6)
+
+
+def cap(count=1200, shape=(1.3, 1.0)):
+    """Triangles in no order of a paraboloid over an ellipse."""
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(4)
+    t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+    inner = np.sqrt(rng.random(count)) * 0.97 * np.exp(2j * np.pi * rng.random(count))
+    z = np.r_[np.exp(1j * t), inner]
+    points = np.stack([shape[0] * z.real, shape[1] * z.imag], axis=1)
+    return Mesh(np.c_[points, 0.5 * (1 - np.abs(z) ** 2)], Delaunay(points).simplices)
+
+
+def test_strips_of_triangles_along_lines_of_grids():
+    mesh = cap()
+    two, four, eight = (gso.strips(mesh, strips=k) for k in (2, 4, 8))
+    assert four.usable and eight.usable and eight.details["rulings_from"] == "lines"
+    assert eight.ruled.strips == 8 and eight.metrics["strain_max"] < 1e-9
+    far = [r.metrics["distance_max"] for r in (two, four, eight)]
+    # Strips across the short side have sagittas of 2.6^2 * 0.6 / 8 / strips^2.
+    expected = 100 * 2.6**2 * 0.6 / 8 / mesh.diagonal
+    assert far[1] < 2 * expected / 16 and far[2] < 2 * expected / 64
+    assert far[2] < far[1] < far[0]
+
+
+def test_strips_of_triangles_do_not_depend_on_numbering_and_place():
+    mesh = cap(500)
+    order = np.random.default_rng(1).permutation(len(mesh.vertices))
+    t = 0.5
+    turn = np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1.0]])
+    moved = 1000.0 * mesh.vertices @ turn.T + [5.0, -3.0, 8.0]
+    other = Mesh(moved[order], np.argsort(order)[mesh.faces])
+    one, two = (gso.strips(m, strips=8).metrics["distance_max"] for m in (mesh, other))
+    assert two == pytest.approx(one, rel=0.1)

@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso import metrics
+from gso import geometry, metrics
+from gso.geometry.polygon import signed_area
+from gso.geometry.vectors import lengths
 from gso.mesh import Mesh
+from gso.mesh.topology import four_corners
+from gso.pattern import Pattern
+from gso.ruled.fold_lines import Folds
 from gso.ruled.ruled_surface import RuledSurface
+from gso.typing import Array
+
+#: Length of a crease that its mean turn is given for, in % of the diagonal.
+_PER = 1.0
+#: Largest width of needles, relative to the diagonal.
+_NEEDLE = 0.001
 
 
 def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
@@ -18,18 +29,70 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
     true = surface.deviation or surface.distances(design)
     percent = 100.0 / design.diagonal
     flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
-    turns = surface.creases.turns(surface.mesh.vertices)
-    return surface.strains | {
-        "distance_mean": percent * true.mean,
-        "distance_max": percent * true.largest,
-        "d_H": metrics.d_H(design, design.replaced(surface.moved)),
-        "fold_max": float(metrics.dihedral_angles(surface.mesh).max(initial=0.0)),
-        "flipped_cells": float(metrics.flips(sheet, flat)),
-        "strips": float(surface.strips),
-        "rulings": float(len(surface.rulings.edges)),
-        "flats": float(np.count_nonzero(surface.flat)),
-        "rulings_crossed": float(surface.crossed),
-        "bend_radius_min": surface.rulings.smallest_radius,
-        "crease_angle_max": float(np.degrees(surface.creases.largest_angle)),
+    return (
+        surface.strains
+        | {
+            "distance_mean": percent * true.mean,
+            "distance_max": percent * true.largest,
+            "d_H": metrics.d_H(design, design.replaced(surface.moved)),
+            "fold_max": float(metrics.dihedral_angles(surface.mesh).max(initial=0.0)),
+            "flipped_cells": float(metrics.flips(sheet, flat)),
+            "strips": float(surface.strips),
+            "rulings": float(len(surface.rulings.edges)),
+            "flats": float(np.count_nonzero(surface.flat)),
+            "rulings_crossed": float(surface.crossed),
+            "bend_radius_min": surface.rulings.smallest_radius,
+        }
+        | _creases(surface.creases, surface.mesh.vertices, percent)
+        | _parts(surface.pattern)
+        | {"needles": float((percent * _widths(surface.mesh) < 100.0 * _NEEDLE).sum())}
+    )
+
+
+def _creases(creases: Folds, vertices: Array, percent: float) -> dict[str, float]:
+    """Return the angles at creases and how much these turn."""
+    turns = creases.turns(vertices)
+    angle = np.degrees(np.abs(creases.angles))
+    order = np.argsort(angle)
+    a, b = vertices[creases.edges].transpose(1, 0, 2)
+    total = np.cumsum(lengths(b - a)[order])
+    length = percent * float(total[-1]) if len(total) else 0.0
+    at = np.searchsorted(total, 0.9 * total[-1]) if len(total) else 0
+    return {
+        "crease_angle_max": float(angle.max(initial=0.0)),
+        "crease_angle_p90": float(angle[order][at]) if len(total) else 0.0,
         "crease_turn_max": float(np.degrees(turns.max(initial=0.0))),
+        "crease_turn_mean": _PER * float(np.degrees(turns.sum())) / length if length else 0.0,
     }
+
+
+def _parts(pattern: Pattern) -> dict[str, float]:
+    """Return the size of the smallest part of a pattern."""
+    import shapely
+
+    mesh, flat = pattern.mesh, pattern.flat
+    label = mesh.components
+    rings: list[list[Array]] = [[] for _ in range(int(label.max()) + 1)]
+    for loop in mesh.boundary_loops:
+        rings[label[loop[0]]].append(flat[loop])
+    areas, widths = [], []
+    for loops in rings:
+        outer, *holes = sorted(loops, key=lambda loop: -abs(signed_area(loop)))
+        # Patterns that meet themselves are no valid polygons.
+        region = shapely.make_valid(shapely.Polygon(outer, holes))
+        areas.append(region.area)
+        circle = shapely.maximum_inscribed_circle(region) if region.area else region
+        widths.append(2.0 * shapely.length(circle) if region.area else 0.0)
+    return {
+        "part_area_min": 100.0 * min(areas) / sum(areas),
+        "part_circle_min": float(min(widths)),
+    }
+
+
+def _widths(mesh: Mesh) -> Array:
+    """Return the largest widths of faces (m,): twice the area over the longest side."""
+    corners = four_corners(mesh.faces)
+    p = mesh.vertices[corners]
+    side = lengths(np.roll(p, -1, axis=1) - p).max(axis=1)
+    double = lengths(geometry.quad_area_vectors(mesh.vertices, corners))
+    return np.asarray(double / side)

@@ -1,8 +1,9 @@
-"""Strips along lines of a quad mesh, for one number of strips after the other."""
+"""Strips along lines of quad meshes, for one number of strips after the other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +22,10 @@ from gso.typing import Array, Ints
 
 #: Name of this way in results.
 LINES = "lines"
-#: Families that are tried, and the ratio of their predicted distance to the smallest up to which.
+#: Families that are tried, and the ratio of their rank to the smallest up to which.
 _FAMILIES, _RATIO = 2, 2.0
+#: Share of the rank up to which the mean distance of sound strips is as good as can be expected.
+_GOOD = 0.5
 #: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
 _PLANAR = 0.2
 #: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
@@ -39,25 +42,33 @@ _MORE, _SOLVES = 1.3, 10
 
 
 class LineStrips:
-    """Strips along lines of a quad mesh whose diagonal is one.
+    """Strips along lines of quad meshes, near a design whose diagonal is one.
 
     Parameters
     ----------
     mesh : Mesh
+        The design. If it has quads only, strips may run along its own lines.
     tell : callable
         Told the number of strips before each solve; returning False ends the search.
+    copies : sequence of Mesh
+        Quad meshes with the same surface, along whose lines strips may run, too.
     """
 
-    def __init__(self, mesh: Mesh, tell: Callable[[int], bool] = lambda count: True):
+    def __init__(
+        self,
+        mesh: Mesh,
+        tell: Callable[[int], bool] = lambda count: True,
+        copies: Sequence[Mesh] = (),
+    ):
         self.mesh, self.tell = mesh, tell
         self.stopped = False
         self.results: dict[int, Found] = {}
         self._measured: set[int] = set()
-        try:
-            self.choices = [Choice(family) for family in families(mesh)]
-        except MeshError:
-            self.choices = []
-        self._fitter = LineFitter(mesh)
+        self.choices: list[Choice] = []
+        for grid in (mesh, *copies):
+            with contextlib.suppress(MeshError):
+                self.choices += [Choice(family) for family in families(grid)]
+        self._fitters: list[LineFitter] = []
 
     @property
     def least(self) -> int:
@@ -120,6 +131,9 @@ class LineStrips:
         tried: list[Found] = []
         for place, (choice, lines) in enumerate(self._candidates(count)):
             tried += self._settled(choice, lines, limit, len(_SETTINGS) >> place)
+            good = _GOOD * choice.rank(count)
+            if any(found.surface.sound and found.mean <= good for found in tried):
+                break
         if tried:
             best = self.results[count] = min(tried, key=lambda found: found.order)
             if half >= max(self.least, 2) and _distance(best) > (False, limit):
@@ -132,8 +146,10 @@ class LineStrips:
         tried: list[Found] = []
         for turn, settings in enumerate(_SETTINGS[:most]):
             found = self._solved(choice, lines, *settings)
-            if found is None:
+            if self.stopped:
                 break
+            if found is None:
+                continue
             tried.append(found)
             if found.surface.sound and (turn > 0 or found.surface.farthest <= limit):
                 break
@@ -198,18 +214,20 @@ class LineStrips:
         )
 
     def _candidates(self, count: int) -> list[tuple[Choice, Ints]]:
-        chosen = [(choice, choice.lines(count)) for choice in self.choices]
-        found = [(pick[1], choice, pick[0]) for choice, pick in chosen if pick is not None]
-        found.sort(key=lambda one: one[0])
-        return [
-            (choice, lines)
-            for far, choice, lines in found[:_FAMILIES]
-            if far <= _RATIO * found[0][0]
-        ]
+        """Return the best families by forecast, and their lines."""
+        ranked = [(choice.rank(count), choice) for choice in self.choices]
+        ranked.sort(key=lambda one: one[0])
+        out = []
+        for rank, choice in ranked[:_FAMILIES]:
+            found = choice.lines(count)
+            if found is not None and rank <= _RATIO * ranked[0][0]:
+                out.append((choice, found[0]))
+        return out
 
     def _solved(self, choice: Choice, lines: Ints, other: bool, fairness: float) -> Found | None:
         """Solve for strips; with the other kind of rulings than the mesh calls for if asked."""
-        v = self.mesh.vertices
+        fitter = self._fitter(choice.family.mesh)
+        v = fitter.mesh.vertices
         try:
             cells = Cells(choice.family, lines)
             polygons = cells.polygons
@@ -224,13 +242,25 @@ class LineStrips:
             one = single(cells, v)
             polygons, ends = (polygons, None) if one is None else one
         elif (_gaps(polygons, v) > _PLANAR * choice.predicted(lines)) != other:
-            polygons = free_rulings(cells, v, self._fitter.normals)
-        points = self._fitter.fit(polygons, v, fairness=fairness)
+            polygons = free_rulings(cells, v, fitter.normals)
+        points = fitter.fit(polygons, v, fairness=fairness)
         if not np.isfinite(points).all():
             return None
-        surface = line_surface(self.mesh, polygons, points, ends)
+        try:
+            surface = line_surface(self.mesh, polygons, points, ends)
+        except MeshError:
+            # Corners that run together leave faces without area.
+            return None
         far = surface.distances(self.mesh, sampled=True)
         return Found(replace(surface, deviation=far), far.mean, LINES)
+
+    def _fitter(self, mesh: Mesh) -> LineFitter:
+        """Return what fits strips along the lines of a mesh."""
+        known = next((fitter for fitter in self._fitters if fitter.mesh is mesh), None)
+        if known is None:
+            known = LineFitter(mesh)
+            self._fitters.append(known)
+        return known
 
 
 def _distance(found: Found) -> tuple[bool, float]:

@@ -284,9 +284,9 @@ class _Task:
         """Return the ways to make strips of the whole design, in order.
 
         Many strips along lines are far nearer than others, which are tried only where those along
-        lines fail.
+        lines fail. Where a number is looked for, others are tried if they may be fewer.
         """
-        if self._many:
+        if self._many or self._counted:
             return self._as_it_is, self._along_lines, self._as_a_whole
         return self._as_it_is, self._as_a_whole, self._along_lines
 
@@ -295,6 +295,12 @@ class _Task:
         """Whether many strips are asked for by their number."""
         number = self.request.options.number
         return number is not None and number >= _MANY
+
+    @property
+    def _counted(self) -> bool:
+        """Whether as few strips are looked for as hold a distance."""
+        asked = self.request
+        return asked.options.number is None and asked.max_deviation is not None
 
     def _divisions(self, light: LightDesign) -> Iterator[Callable[[], Pieces]]:
         """Return the ways to divide the design, those into fewer pieces first."""
@@ -340,6 +346,11 @@ class _Task:
         enough = any(one.is_close or (self._many and one.holds) for one in tried)
         if enough or not _is_whole(light.mesh):
             return []
+        held = [one.strips for one in tried if self._counted and one.holds]
+        most = min([asked.options.max_strips, *(count - 1 for count in held)])
+        if most < 1:
+            return []
+        asked = replace(asked, options=replace(asked.options, max_strips=most))
         asked.say("as a whole")
 
         def made(options: Options) -> Result:

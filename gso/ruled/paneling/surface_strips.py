@@ -18,7 +18,7 @@ from gso.pipeline.user_result import pack, record_violations
 from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
-from gso.ruled.lines import EXACT, LineStrips
+from gso.ruled.lines import EXACT, LineStrips, grid_copies
 from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
@@ -183,16 +183,16 @@ def _across(domain: Domain) -> Array:
 
 
 def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
-    """Return the strips along a design's own lines, not solved yet; None where there are no lines.
+    """Return the strips along a design's lines, not solved yet; None where there are no lines.
 
     Parameters
     ----------
     design : Mesh
-        One surface of quads, with a boundary, possibly with holes or closed around.
+        One surface with a boundary: of quads, possibly with holes or closed around; or a disk.
     request : StripsRequest
         Without constraints.
     """
-    if design.has_triangles or not design.boundary_loops:
+    if not design.boundary_loops:
         return None
     size, centre = design.diagonal, design.frame.centre
 
@@ -200,7 +200,12 @@ def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
         progress = Progress(0, 1, 0, 1, 0.0, {}, 1.0, f"strips along lines: {count}")
         return request.goes_on(progress)
 
-    return LineStrips(design.replaced((design.vertices - centre) / size), told)
+    mesh = design.replaced((design.vertices - centre) / size)
+    # Quads have lines of their own.
+    copies = grid_copies(mesh) if mesh.has_triangles else []
+    if mesh.has_triangles and not copies:
+        return None
+    return LineStrips(mesh, told, copies)
 
 
 def along_lines(

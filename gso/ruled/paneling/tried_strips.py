@@ -33,9 +33,13 @@ class Tried:
 
     def order(self, *, few: bool) -> tuple[bool, int, float]:
         """Sort key: what was asked for first, fewer strips before more if asked, then distances."""
+        return not self.holds, self.strips if few and self.holds else 0, self.far
+
+    @property
+    def strips(self) -> int:
+        """Number of strips."""
         surface = self.result.ruled
-        count = surface.strips if few and self.holds and surface is not None else 0
-        return not self.holds, count, self.far
+        return 0 if surface is None else surface.strips
 
     @property
     def is_close(self) -> bool:

@@ -1,0 +1,150 @@
+"""Grids on a disk: copies of a design whose lines strips may run along.
+
+The outline is divided into four sides, and the disk is mapped harmonically to a rectangle, so that
+grid lines join opposite sides. Sides begin at the sharpest corners of the outline, or where a
+box along the principal directions of curvature, or along a given direction, touches it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso import geometry, parametrization
+from gso.geometry.polygon import arc_lengths, signed_area
+from gso.geometry.vectors import lengths
+from gso.mesh import Mesh, Nearest, vertex_normals
+from gso.ruled.polygon import turning
+from gso.typing import Array, Ints
+
+#: Number of cells.
+_CELLS = 48**2
+#: Smallest number of rows or columns.
+_FEW = 12
+#: Turning of the outline at a corner, in radians.
+_SHARP = np.radians(30.0)
+#: Points around the outline, and how many of them its places are averaged over to smooth it.
+_AROUND, _WINDOW = 256, 33
+
+
+def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
+    """Make grids on a disk whose lines run along several directions; none on other surfaces.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    along : ndarray, (m, 3), optional
+        A direction at each triangle that lines of the only grid are to follow.
+
+    Examples
+    --------
+    >>> u, v = np.mgrid[-1:1:9j, -1:1:9j]
+    >>> sheet = Mesh.from_grid(np.stack([u, v, 0.2 * v * v], axis=-1))
+    >>> (copy,) = grid_copies(Mesh(sheet.vertices, sheet.triangles))
+    >>> copy.grid_shape
+    (48, 50)
+    """
+    if len(mesh.boundary_loops) != 1 or not parametrization.flattens(mesh):
+        return []
+    (loop,) = mesh.boundary_loops
+    flat = parametrization.begin(mesh).flat
+    flat = flat if signed_area(flat[loop]) > 0 else flat * [1.0, -1.0]
+    outline = flat[loop]
+    turn = turning(outline)
+    found: list[Ints] = []
+    if along is None:
+        sharpest = np.sort(np.argsort(-turn, kind="stable")[:4])
+        if turn[sharpest].min() > _SHARP:
+            found.append(sharpest)
+    angle = _principal(mesh, flat) if along is None else _direction(mesh, flat, along)
+    corners = _touching(outline, turn, angle)
+    if corners is not None and not any(np.array_equal(np.sort(corners), own) for own in found):
+        found.append(corners)
+    return [_grid(mesh, loop, turn, corners) for corners in found]
+
+
+def _slopes(mesh: Mesh, flat: Array, values: Array) -> Array:
+    """Return the derivatives (t, d, 2) of values (n, d) on the triangles by places in the plane."""
+    corner, value = flat[mesh.triangles], values[mesh.triangles]
+    edges = np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2)
+    change = np.swapaxes(value[:, 1:] - value[:, :1], 1, 2)
+    double = np.linalg.det(edges)
+    safe = np.where(np.abs(double) > 1e-14 * np.abs(double).max(), double, np.inf)
+    inverse = np.stack([edges[:, 1, 1], -edges[:, 0, 1], -edges[:, 1, 0], edges[:, 0, 0]], axis=1)
+    return np.asarray(change @ (inverse.reshape(-1, 2, 2) / safe[:, None, None]))
+
+
+def _principal(mesh: Mesh, flat: Array) -> float:
+    """Return the angle in the plane of a principal direction of curvature, on the whole."""
+    position, normal = (_slopes(mesh, flat, x) for x in (mesh.vertices, vertex_normals(mesh)))
+    second = np.einsum("tdi,tdj->tij", position, normal)
+    weight = np.abs(geometry.signed_areas(flat, mesh.triangles))
+    # Turned by an angle, this number turns by twice that; its square is that of both directions.
+    two = second[:, 0, 0] - second[:, 1, 1] + 1j * (second[:, 0, 1] + second[:, 1, 0])
+    return float(0.25 * np.angle(weight @ two**2))
+
+
+def _direction(mesh: Mesh, flat: Array, along: Array) -> float:
+    """Return the angle in the plane that is along directions (t, 3) on the whole."""
+    own = np.einsum("tdi,td->ti", _slopes(mesh, flat, mesh.vertices), along)
+    weight = np.abs(geometry.signed_areas(flat, mesh.triangles))
+    square = np.einsum("t,ti,tj->ij", weight, own, own)
+    return float(0.5 * np.arctan2(square[0, 1] + square[1, 0], square[0, 0] - square[1, 1]))
+
+
+def _touching(outline: Array, turn: Array, angle: float) -> Ints | None:
+    """Return where a turned box has its corners, (4,) positions; None where two are the same.
+
+    The outline is smoothed before; a sharp corner nearby is taken instead.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    along = arc_lengths(np.vstack([outline, outline[:1]]))
+    places = np.linspace(0.0, along[-1], _AROUND, endpoint=False)
+    z = np.exp(-1j * angle) * (outline @ np.array([1.0, 1j]))
+    x, y = (np.interp(places, along, np.append(c, c[0]) / np.ptp(c)) for c in (z.real, z.imag))
+    sharp = np.flatnonzero(turn > _SHARP)
+
+    def gaps(one: float, others: Array) -> Array:
+        gap: Array = np.abs(one - others)
+        return np.asarray(np.minimum(gap, along[-1] - gap))
+
+    corners = []
+    for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+        smooth = uniform_filter1d(a * x + b * y, _WINDOW, mode="wrap")
+        top = places[smooth.argmax()]
+        off = gaps(top, along[sharp])
+        near = bool(len(off)) and off.min() <= along[-1] * _WINDOW / (2 * _AROUND)
+        corners.append(sharp[off.argmin()] if near else gaps(top, along[:-1]).argmin())
+    first = (np.array(corners) - corners[0]) % len(outline)
+    return np.array(corners) if (np.diff(np.r_[first, len(outline)]) > 0).all() else None
+
+
+def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
+    """Return a grid whose corners are at positions (4,) of the outline."""
+    loop, turn = np.roll(loop, -corners[0]), np.roll(turn, -corners[0])
+    n = len(loop)
+    start = np.r_[(corners - corners[0]) % n, n]
+    ring = mesh.vertices[np.r_[loop, loop[0]]]
+    along = arc_lengths(ring)
+    side = np.diff(along[start])
+    wide, high = 0.5 * (side[0] + side[2]), 0.5 * (side[1] + side[3])
+    box = np.array([[0.0, 0.0], [wide, 0.0], [wide, high], [0.0, high], [0.0, 0.0]])
+    which = np.repeat(np.arange(4), np.diff(start))
+    share = (along[:-1] - along[start[which]]) / side[which]
+    rim = box[which] + share[:, None] * (box[which + 1] - box[which])
+    image = parametrization.spanned(Mesh(mesh.vertices, mesh.triangles), loop, rim)
+    rows = int(np.clip(np.sqrt(_CELLS * wide / high), _FEW, _CELLS // _FEW))
+    columns = max(_CELLS // rows, _FEW)
+    axes = np.linspace(0.0, wide, rows + 1), np.linspace(0.0, high, columns + 1)
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    flat = places.reshape(-1, 2)
+    triangle, shares, _ = Nearest.of(np.pad(image, ((0, 0), (0, 1))), mesh.triangles).locate(
+        np.pad(flat, ((0, 0), (0, 1)))
+    )
+    points = np.einsum("kj,kjd->kd", shares, mesh.vertices[mesh.triangles[triangle]])
+    # Corners of the outline stay.
+    index = np.arange(len(points)).reshape(rows + 1, columns + 1)
+    border = np.r_[index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]]
+    for k in np.flatnonzero(np.abs(turn) > _SHARP):
+        points[border[lengths(flat[border] - rim[k]).argmin()]] = mesh.vertices[loop[k]]
+    return Mesh.from_grid(points.reshape(rows + 1, columns + 1, 3))
