@@ -311,3 +311,12 @@ def test_strips_of_triangles_do_not_depend_on_numbering_and_place():
     other = Mesh(moved[order], np.argsort(order)[mesh.faces])
     one, two = (gso.strips(m, strips=8).metrics["distance_max"] for m in (mesh, other))
     assert two == pytest.approx(one, rel=0.1)
+
+
+def test_tubes_of_triangles_become_strips():
+    tube = revolved(rows=12, around=36)
+    triangles = Mesh(tube.vertices, tube.triangles)
+    allowed = 0.01 * tube.diagonal
+    result = gso.strips(triangles, max_deviation=allowed)
+    assert result.usable and result.pieces is None and result.ruled.strips <= 6
+    assert len(result.mesh.boundary_loops) == 2

@@ -2,6 +2,7 @@
 
 from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
+from gso.parametrization.around import Around, around
 from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.low_strain import low_strain
@@ -12,9 +13,11 @@ from gso.parametrization.rectangle import rectangle
 
 __all__ = [
     "SAFETY",
+    "Around",
     "Opened",
     "Relaxed",
     "align",
+    "around",
     "begin",
     "beside",
     "by_rows",

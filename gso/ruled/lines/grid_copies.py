@@ -1,8 +1,9 @@
-"""Grids on a disk: copies of a design whose lines strips may run along.
+"""Grids on a disk or a tube: copies of a design whose lines strips may run along.
 
 The outline is divided into four sides, and the disk is mapped harmonically to a rectangle, so that
 grid lines join opposite sides. Sides begin at the sharpest corners of the outline, or where a
-box along the principal directions of curvature, or along a given direction, touches it.
+box along the principal directions of curvature, or along a given direction, touches it. Surfaces
+with two boundary loops are mapped to a cylinder.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.ruled.polygon import turning
 from gso.typing import Array, Ints
 
-#: Number of cells.
-_CELLS = 48**2
+#: Least and largest number of cells; between these, half as many as triangles.
+_CELLS = (48**2, 64**2)
 #: Smallest number of rows or columns.
 _FEW = 12
+#: Number of lines that distances between lines are measured on, and the power of their mean.
+_FINE, _WIDE = 128, 8
 #: Turning of the outline at a corner, in radians.
 _SHARP = np.radians(30.0)
 #: Points around the outline, and how many of them its places are averaged over to smooth it.
@@ -27,7 +30,7 @@ _AROUND, _WINDOW = 256, 33
 
 
 def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
-    """Make grids on a disk whose lines run along several directions; none on other surfaces.
+    """Make grids on a disk or a tube whose lines run along several directions; else none.
 
     Parameters
     ----------
@@ -43,6 +46,9 @@ def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
     >>> copy.grid_shape
     (48, 50)
     """
+    if len(mesh.boundary_loops) == 2:
+        image = parametrization.around(mesh)
+        return [] if image is None else [_closed(image)]
     if len(mesh.boundary_loops) != 1 or not parametrization.flattens(mesh):
         return []
     (loop,) = mesh.boundary_loops
@@ -133,18 +139,74 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
     share = (along[:-1] - along[start[which]]) / side[which]
     rim = box[which] + share[:, None] * (box[which + 1] - box[which])
     image = parametrization.spanned(Mesh(mesh.vertices, mesh.triangles), loop, rim)
-    rows = int(np.clip(np.sqrt(_CELLS * wide / high), _FEW, _CELLS // _FEW))
-    columns = max(_CELLS // rows, _FEW)
-    axes = np.linspace(0.0, wide, rows + 1), np.linspace(0.0, high, columns + 1)
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    flat = places.reshape(-1, 2)
-    triangle, shares, _ = Nearest.of(np.pad(image, ((0, 0), (0, 1))), mesh.triangles).locate(
-        np.pad(flat, ((0, 0), (0, 1)))
-    )
-    points = np.einsum("kj,kjd->kd", shares, mesh.vertices[mesh.triangles[triangle]])
+    rows, columns = _counts(wide, high, len(mesh.triangles))
+
+    def placed(one: Array, two: Array) -> Array:
+        return _placed(mesh.vertices, mesh.triangles, image, one, two)
+
+    even = [np.linspace(0.0, x, _FINE) for x in (wide, high)]
+    fine = placed(*even)
+    one = _spread(even[0], fine, rows + 1)
+    two = _spread(even[1], np.swapaxes(fine, 0, 1), columns + 1)
+    points = placed(one, two).reshape(-1, 3)
+    flat = np.stack(np.meshgrid(one, two, indexing="ij"), axis=-1).reshape(-1, 2)
     # Corners of the outline stay.
     index = np.arange(len(points)).reshape(rows + 1, columns + 1)
     border = np.r_[index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]]
     for k in np.flatnonzero(np.abs(turn) > _SHARP):
         points[border[lengths(flat[border] - rim[k]).argmin()]] = mesh.vertices[loop[k]]
     return Mesh.from_grid(points.reshape(rows + 1, columns + 1, 3))
+
+
+def _closed(image: parametrization.Around) -> Mesh:
+    """Return a grid that closes around."""
+    wide, high = image.size
+    around, up = _counts(wide, high, len(image.mesh.triangles))
+    # The image winds: its neighbours on both sides have the other points.
+    n, turns = len(image.flat), (-1, 0, 1)
+    every = np.concatenate([image.flat + np.array([k * wide, 0.0]) for k in turns])
+    triangles = np.concatenate([image.mesh.triangles + k * n for k in range(len(turns))])
+    vertices = np.tile(image.mesh.vertices, (len(turns), 1))
+    begin = float(image.flat[:, 0].min())
+
+    def placed(one: Array, two: Array) -> Array:
+        return _placed(vertices, triangles, every, begin + one, two)
+
+    even = [np.linspace(0.0, x, _FINE) for x in (wide, high)]
+    fine = placed(*even)
+    one = _spread(even[0], fine, around + 1)[:-1]
+    points = placed(one, _spread(even[1], np.swapaxes(fine, 0, 1), up + 1)).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(around, up + 1)
+    after = np.roll(index, -1, axis=0)
+    corners = [index[:, :-1], after[:, :-1], after[:, 1:], index[:, 1:]]
+    return Mesh(points, np.stack(corners, axis=-1).reshape(-1, 4))
+
+
+def _counts(wide: float, high: float, triangles: int) -> tuple[int, int]:
+    """Return the numbers of cells of a grid along both sides."""
+    cells = int(np.clip(triangles // 2, *_CELLS))
+    rows = int(np.clip(np.sqrt(cells * wide / high), _FEW, cells // _FEW))
+    return rows, max(cells // rows, _FEW)
+
+
+def _spread(places: Array, points: Array, count: int) -> Array:
+    """Return places (count,) whose lines are about equally far apart.
+
+    Parameters
+    ----------
+    places : ndarray, (k,)
+    points : ndarray, (k, c, 3)
+        Points of the surface on the line at each place.
+    """
+    step = (lengths(np.diff(points, axis=0)) ** _WIDE).mean(axis=1) ** (1.0 / _WIDE)
+    along = np.r_[0.0, np.cumsum(step)]
+    return np.interp(np.linspace(0.0, along[-1], count), along, places)
+
+
+def _placed(vertices: Array, triangles: Ints, image: Array, one: Array, two: Array) -> Array:
+    """Return the points (k, l, 3) of a surface whose images are nearest to a lattice."""
+    near = Nearest.of(np.pad(image, ((0, 0), (0, 1))), triangles)
+    flat = np.stack(np.meshgrid(one, two, indexing="ij"), axis=-1)
+    triangle, shares, _ = near.locate(np.pad(flat.reshape(-1, 2), ((0, 0), (0, 1))))
+    found = np.einsum("kj,kjd->kd", shares, vertices[triangles[triangle]])
+    return np.asarray(found.reshape(*flat.shape[:2], 3))

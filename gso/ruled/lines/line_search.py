@@ -24,6 +24,8 @@ from gso.typing import Array, Ints
 LINES = "lines"
 #: Families that are tried, and the ratio of their rank to the smallest up to which.
 _FAMILIES, _RATIO = 2, 2.0
+#: Ratio of ranks up to which both are tried in any case.
+_ALIKE = 1.25
 #: Share of the rank up to which the mean distance of sound strips is as good as can be expected.
 _GOOD = 0.5
 #: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
@@ -129,11 +131,14 @@ class LineStrips:
         half = max(count // 2, 1)
         limit = _WORSE * self.predicted(half)
         tried: list[Found] = []
+        good, least = 0.0, np.inf
         for place, (choice, lines) in enumerate(self._candidates(count)):
+            least = min(least, choice.rank(count))
+            alike = choice.rank(count) <= _ALIKE * least
+            if not alike and any(one.surface.sound and one.mean <= good for one in tried):
+                break
             tried += self._settled(choice, lines, limit, len(_SETTINGS) >> place)
             good = _GOOD * choice.rank(count)
-            if any(found.surface.sound and found.mean <= good for found in tried):
-                break
         if tried:
             best = self.results[count] = min(tried, key=lambda found: found.order)
             if half >= max(self.least, 2) and _distance(best) > (False, limit):
