@@ -15,6 +15,8 @@ from gso.typing import Array, Flags, Ints
 
 #: Least weight of an edge in a triangle, which keeps images from being inverted.
 _LEAST = 0.05
+#: Largest share of inverted triangles.
+_INVERTED = 0.005
 
 
 class Around(NamedTuple):
@@ -39,7 +41,7 @@ def around(mesh: Mesh) -> Around | None:
     """Map a surface with two boundary loops and no handle to a cylinder, harmonically.
 
     The loops become its ends. Around it, points move freely along them, so that the image is
-    nearly conformal. None for other surfaces, and where triangles would be inverted.
+    nearly conformal. None for other surfaces, and where too many triangles would be inverted.
 
     Parameters
     ----------
@@ -66,24 +68,26 @@ def around(mesh: Mesh) -> Around | None:
         return None
     own, triangles = opened.vertex, opened.mesh.triangles
     angles = geometry.corner_angles(opened.mesh.vertices, triangles)
-    weight = np.maximum(0.5 / np.tan(np.clip(angles, 1e-6, np.pi - 1e-6)), _LEAST).ravel()
+    cotangent = 0.5 / np.tan(np.clip(angles, 1e-6, np.pi - 1e-6))
     a, b = (np.roll(triangles, -k, axis=1).ravel() for k in (1, 2))
-    step = weight * (right[a].astype(float) - right[b])
     one, two, count = own[a], own[b], len(whole.vertices)
-    pull = np.asarray(np.bincount(two, step, count) - np.bincount(one, step, count), float)
-    # Each edge pulls at its ends by the turn around the cylinder that it takes.
-    x = _harmonic(one, two, weight, np.array([low[0]]), np.zeros(1), pull)
-    ends = np.r_[low, high]
-    y = _harmonic(
-        one, two, weight, ends, np.repeat([0.0, 1.0], [len(low), len(high)]), np.zeros(count)
-    )
     wide = 0.5 * sum(perimeter(mesh.vertices[loop]) for loop in (low, high))
     area = 0.5 * float(geometry.doubled_areas(whole.vertices, whole.triangles).sum())
     size = (wide, area / wide)
-    flat = np.stack([x[own] + right, y[own]], axis=1) * size
-    if not (geometry.signed_areas(flat, triangles) > 0).all():
-        return None
-    return Around(opened.mesh, flat, size)
+    best, most = None, _INVERTED * len(triangles)
+    for weights in (np.maximum(cotangent, _LEAST), np.ones(angles.shape)):
+        weight = weights.ravel()
+        step = weight * (right[a].astype(float) - right[b])
+        pull = np.asarray(np.bincount(two, step, count) - np.bincount(one, step, count), float)
+        # Each edge pulls at its ends by the turn around the cylinder that it takes.
+        x = _harmonic(one, two, weight, low[:1], np.zeros(1), pull)
+        ends, at = np.r_[low, high], np.repeat([0.0, 1.0], [len(low), len(high)])
+        y = _harmonic(one, two, weight, ends, at, np.zeros(count))
+        flat = np.stack([x[own] + right, y[own]], axis=1) * size
+        inverted = np.count_nonzero(geometry.signed_areas(flat, triangles) <= 0)
+        if inverted <= most:
+            best, most = flat, inverted - 1
+    return None if best is None else Around(opened.mesh, best, size)
 
 
 def _right(mesh: Mesh, vertex: Ints, low: Ints) -> Flags | None:

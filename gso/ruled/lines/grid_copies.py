@@ -12,8 +12,9 @@ import numpy as np
 
 from gso import geometry, parametrization
 from gso.geometry.polygon import arc_lengths, signed_area
-from gso.geometry.vectors import lengths
+from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest, vertex_normals
+from gso.mesh.polyline import turns
 from gso.ruled.polygon import turning
 from gso.typing import Array, Ints
 
@@ -22,7 +23,7 @@ _CELLS = (48**2, 64**2)
 #: Smallest number of rows or columns.
 _FEW = 12
 #: Number of lines that distances between lines are measured on, and the power of their mean.
-_FINE, _WIDE = 128, 8
+_FINE, _WIDE = 128, 40
 #: Turning of the outline at a corner, in radians.
 _SHARP = np.radians(30.0)
 #: Points around the outline, and how many of them its places are averaged over to smooth it.
@@ -48,7 +49,7 @@ def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
     """
     if len(mesh.boundary_loops) == 2:
         image = parametrization.around(mesh)
-        return [] if image is None else [_closed(image)]
+        return [] if image is None else [_closed(mesh, image)]
     if len(mesh.boundary_loops) != 1 or not parametrization.flattens(mesh):
         return []
     (loop,) = mesh.boundary_loops
@@ -154,19 +155,21 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
     index = np.arange(len(points)).reshape(rows + 1, columns + 1)
     border = np.r_[index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]]
     for k in np.flatnonzero(np.abs(turn) > _SHARP):
-        points[border[lengths(flat[border] - rim[k]).argmin()]] = mesh.vertices[loop[k]]
+        at = int(lengths(flat[border] - rim[k]).argmin())
+        points[border[at]] = mesh.vertices[loop[k]]
+        border = np.delete(border, at)
     return Mesh.from_grid(points.reshape(rows + 1, columns + 1, 3))
 
 
-def _closed(image: parametrization.Around) -> Mesh:
+def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
     """Return a grid that closes around."""
     wide, high = image.size
     around, up = _counts(wide, high, len(image.mesh.triangles))
     # The image winds: its neighbours on both sides have the other points.
-    n, turns = len(image.flat), (-1, 0, 1)
-    every = np.concatenate([image.flat + np.array([k * wide, 0.0]) for k in turns])
-    triangles = np.concatenate([image.mesh.triangles + k * n for k in range(len(turns))])
-    vertices = np.tile(image.mesh.vertices, (len(turns), 1))
+    n, windings = len(image.flat), (-1, 0, 1)
+    every = np.concatenate([image.flat + np.array([k * wide, 0.0]) for k in windings])
+    triangles = np.concatenate([image.mesh.triangles + k * n for k in range(len(windings))])
+    vertices = np.tile(image.mesh.vertices, (len(windings), 1))
     begin = float(image.flat[:, 0].min())
 
     def placed(one: Array, two: Array) -> Array:
@@ -177,6 +180,18 @@ def _closed(image: parametrization.Around) -> Mesh:
     one = _spread(even[0], fine, around + 1)[:-1]
     points = placed(one, _spread(even[1], np.swapaxes(fine, 0, 1), up + 1)).reshape(-1, 3)
     index = np.arange(len(points)).reshape(around, up + 1)
+    # Corners of the outline stay.
+    for loop in mesh.boundary_loops:
+        way, free = (
+            np.roll(mesh.vertices[loop], -1, axis=0) - mesh.vertices[loop],
+            np.arange(around),
+        )
+        for vertex in loop[np.radians(turns(unit(way))) > _SHARP]:
+            x, y = image.flat[vertex]
+            gap = np.abs(one[free] - (x - begin) % wide)
+            at = int(np.minimum(gap, wide - gap).argmin())
+            points[index[free[at], -1 if y > 0.5 * high else 0]] = mesh.vertices[vertex]
+            free = np.delete(free, at)
     after = np.roll(index, -1, axis=0)
     corners = [index[:, :-1], after[:, :-1], after[:, 1:], index[:, 1:]]
     return Mesh(points, np.stack(corners, axis=-1).reshape(-1, 4))
