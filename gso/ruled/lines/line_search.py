@@ -52,25 +52,39 @@ class LineStrips:
         The design. If it has quads only, strips may run along its own lines.
     tell : callable
         Told the number of strips before each solve; returning False ends the search.
-    copies : sequence of Mesh
-        Quad meshes with the same surface, along whose lines strips may run, too.
+    copies : callable
+        Returns quad meshes with the same surface, along whose lines strips may run, too. They are
+        made where the design's own lines are too few or their strips fail.
     """
 
     def __init__(
         self,
         mesh: Mesh,
         tell: Callable[[int], bool] = lambda count: True,
-        copies: Sequence[Mesh] = (),
+        copies: Callable[[], Sequence[Mesh]] = tuple,
     ):
         self.mesh, self.tell = mesh, tell
+        self._copies = copies
         self.stopped = False
         self.results: dict[int, Found] = {}
         self._measured: set[int] = set()
         self.choices: list[Choice] = []
-        for grid in (mesh, *copies):
-            with contextlib.suppress(MeshError):
-                self.choices += [Choice(family) for family in families(grid)]
         self._fitters: list[LineFitter] = []
+        self._add([mesh])
+        if self.least != 1:
+            self._add_copies()
+
+    def _add(self, meshes: Sequence[Mesh]) -> None:
+        """Add the families of lines of quad meshes."""
+        for mesh in meshes:
+            with contextlib.suppress(MeshError):
+                self.choices += [Choice(family) for family in families(mesh)]
+
+    def _add_copies(self) -> bool:
+        """Add the lines of copies, and return whether there are more lines now."""
+        before, copies, self._copies = len(self.choices), self._copies, tuple
+        self._add(copies())
+        return len(self.choices) > before
 
     @property
     def least(self) -> int:
@@ -130,19 +144,28 @@ class LineStrips:
             return
         half = max(count // 2, 1)
         limit = _WORSE * self.predicted(half)
+        own = len(self.choices)
+        tried = self._tried(count, limit, self.choices)
+        poor = all(_distance(found) > (False, limit) for found in tried)
+        if poor and not self.stopped and self._add_copies():
+            tried += self._tried(count, limit, self.choices[own:])
+        if tried:
+            best = self.results[count] = min(tried, key=lambda found: found.order)
+            if half >= max(self.least, 2) and _distance(best) > (False, limit):
+                self._solve(half)
+
+    def _tried(self, count: int, limit: float, choices: Sequence[Choice]) -> list[Found]:
+        """Solve for strips along the best of some families of lines."""
         tried: list[Found] = []
         good, least = 0.0, np.inf
-        for place, (choice, lines) in enumerate(self._candidates(count)):
+        for place, (choice, lines) in enumerate(_candidates(count, choices)):
             least = min(least, choice.rank(count))
             alike = choice.rank(count) <= _ALIKE * least
             if not alike and any(one.surface.sound and one.mean <= good for one in tried):
                 break
             tried += self._settled(choice, lines, limit, len(_SETTINGS) >> place)
             good = _GOOD * choice.rank(count)
-        if tried:
-            best = self.results[count] = min(tried, key=lambda found: found.order)
-            if half >= max(self.least, 2) and _distance(best) > (False, limit):
-                self._solve(half)
+        return tried
 
     def _settled(
         self, choice: Choice, lines: Ints, limit: float, most: int = len(_SETTINGS)
@@ -218,17 +241,6 @@ class LineStrips:
             and wanted.met(self._certain(count).surface)
         )
 
-    def _candidates(self, count: int) -> list[tuple[Choice, Ints]]:
-        """Return the best families by forecast, and their lines."""
-        ranked = [(choice.rank(count), choice) for choice in self.choices]
-        ranked.sort(key=lambda one: one[0])
-        out = []
-        for rank, choice in ranked[:_FAMILIES]:
-            found = choice.lines(count)
-            if found is not None and rank <= _RATIO * ranked[0][0]:
-                out.append((choice, found[0]))
-        return out
-
     def _solved(self, choice: Choice, lines: Ints, other: bool, fairness: float) -> Found | None:
         """Solve for strips; with the other kind of rulings than the mesh calls for if asked."""
         fitter = self._fitter(choice.family.mesh)
@@ -266,6 +278,17 @@ class LineStrips:
             known = LineFitter(mesh)
             self._fitters.append(known)
         return known
+
+
+def _candidates(count: int, choices: Sequence[Choice]) -> list[tuple[Choice, Ints]]:
+    """Return the best families by forecast, and their lines."""
+    ranked = sorted(choices, key=lambda choice: choice.rank(count))[:_FAMILIES]
+    out = []
+    for choice in ranked:
+        found = choice.lines(count)
+        if found is not None and choice.rank(count) <= _RATIO * ranked[0].rank(count):
+            out.append((choice, found[0]))
+    return out
 
 
 def _distance(found: Found) -> tuple[bool, float]:

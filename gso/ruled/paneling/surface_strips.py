@@ -201,11 +201,8 @@ def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
         return request.goes_on(progress)
 
     mesh = design.replaced((design.vertices - centre) / size)
-    # Quads have lines of their own.
-    copies = grid_copies(mesh) if mesh.has_triangles else []
-    if mesh.has_triangles and not copies:
-        return None
-    return LineStrips(mesh, told, copies)
+    lines = LineStrips(mesh, told, lambda: grid_copies(mesh))
+    return lines if lines.choices else None
 
 
 def along_lines(
