@@ -320,3 +320,32 @@ def test_tubes_of_triangles_become_strips():
     result = gso.strips(triangles, max_deviation=allowed)
     assert result.usable and result.pieces is None and result.ruled.strips <= 6
     assert len(result.mesh.boundary_loops) == 2
+
+
+def run_along(result) -> np.ndarray:
+    """Return the direction of the creases, on the whole."""
+    surface = result.ruled
+    way = np.diff(surface.mesh.vertices[surface.creases.edges], axis=1)[:, 0]
+    return np.linalg.eigh(way.T @ way)[1][:, -1]
+
+
+@pytest.mark.parametrize("quads", [True, False])
+def test_strips_run_along_a_direction_or_a_line(quads):
+    mesh = gso.as_mesh(dome(17))
+    mesh = mesh if quads else Mesh(mesh.vertices, mesh.triangles)
+    for along, axis in (("x", 0), ([0.1, -2.0, 0.3], 1), ([[-1, 0, 0], [0, 0.1, 0], [1, 0, 0]], 0)):
+        result = gso.strips(mesh, strips=4, along=along)
+        assert result.usable and abs(run_along(result)[axis]) > 0.95
+
+
+@pytest.mark.parametrize("wrong", ["q", 3, [1, 2], [0, 0, 0], "1,2,x", [[1, 0, 0], [1, 0, 0]]])
+def test_directions_that_are_none_are_refused(wrong):
+    with pytest.raises(gso.OptionError, match="along is"):
+        gso.strips(dome(5), strips=2, along=wrong)
+
+
+def test_a_direction_takes_several_strips_and_no_constraints():
+    with pytest.raises(gso.OptionError, match="along takes strips=2"):
+        gso.strips(dome(5), along="x")
+    with pytest.raises(gso.OptionError, match="along takes"):
+        gso.strips(dome(5), strips=4, along="x", constraints=[gso.constraints.FixedBoundary()])

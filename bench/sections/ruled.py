@@ -51,7 +51,9 @@ def cad(seed: str = "", count: int = 24) -> dict[str, Any]:
 
     columns = [("turn deg", np.median), ("worst", "turn deg", np.max), ("no break", sum)]
     columns += [("torsal", sum), *((k, np.median) for k in ("mean %", "max %", "faces", "s"))]
-    runs = {number: _solver("design", **STRIPS[number]) for number in ("1", "tree", "4")}
+    runs = {
+        number: _solver("design", lines=False, **STRIPS[number]) for number in ("1", "tree", "4")
+    }
     title = f"Smooth strips of {len(surfaces)} surfaces"
     return compare(title, runs, surfaces, rated, columns, head="strips")
 

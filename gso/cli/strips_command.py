@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -51,6 +52,12 @@ class _StripsJob(Job):
     help="Largest angle at a crease between strips.",
 )
 @shared.min_radius
+@click.option(
+    "--no-lines",
+    is_flag=True,
+    help="No strips along lines of the mesh or of a grid: others become smooth surfaces in CAD "
+    "files.",
+)
 @click.option("--flats", is_flag=True, help="A single strip may branch at flat triangles.")
 @click.option(
     "--options",
@@ -59,6 +66,11 @@ class _StripsJob(Job):
     help="How much work to do.",
 )
 @shared.constraints
+@click.option(
+    "--along",
+    metavar="DIRECTION",
+    help='Direction that strips run along: x, y, z, or a vector such as "1,1,0".',
+)
 @shared.sheet
 @shared.workers
 @shared.plot
@@ -88,6 +100,10 @@ def strips(
     count = given["strips"]
     given["strips"] = int(count) if count is not None and count.isdecimal() else count
     given["flats"] = given["flats"] or None
+    if given.pop("no_lines"):
+        from gso import RuledOptions
+
+        given["options"] = replace(RuledOptions.coerce(given["options"]), lines=False)
     if constraints is not None:
         from gso.constraints import read_constraints
 

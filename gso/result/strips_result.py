@@ -90,7 +90,10 @@ class StripsResult(Result):
         io.check_spline(path, unit)
         if self.ruled.untrimmed is None:
             io.save_faces(self.mesh, path, unit=unit)
-            self.notes += (f"{path} has planar faces: strips along lines have no smooth surfaces",)
+            self.notes += (
+                f"{path} has planar faces: strips along lines have no smooth surfaces; those made "
+                "without lines (RuledOptions(lines=False), --no-lines) have",
+            )
             return
         # Constraints may have moved the strips away from the design.
         design = None if "constraints" in self.details else self.design

@@ -15,6 +15,7 @@ from gso.ruled.lines.line_choice import Choice
 from gso.ruled.lines.line_families import families
 from gso.ruled.lines.line_fit import LineFitter
 from gso.ruled.lines.line_surface import line_surface
+from gso.ruled.lines.line_twist import alignment
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.lines.strip_cells import Cells
 from gso.ruled.solve import Found, Wanted
@@ -55,6 +56,9 @@ class LineStrips:
     copies : callable
         Returns quad meshes with the same surface, along whose lines strips may run, too. They are
         made where the design's own lines are too few or their strips fail.
+    along : callable, optional
+        Returns unit directions (m, 3) at the faces of a mesh. Strips run only along the family of
+        lines that is the nearest to them.
     """
 
     def __init__(
@@ -62,6 +66,7 @@ class LineStrips:
         mesh: Mesh,
         tell: Callable[[int], bool] = lambda count: True,
         copies: Callable[[], Sequence[Mesh]] = tuple,
+        along: Callable[[Mesh], Array] | None = None,
     ):
         self.mesh, self.tell = mesh, tell
         self._copies = copies
@@ -71,8 +76,11 @@ class LineStrips:
         self.choices: list[Choice] = []
         self._fitters: list[LineFitter] = []
         self._add([mesh])
-        if self.least != 1:
+        if self.least != 1 or along is not None:
             self._add_copies()
+        if along is not None:
+            aligned = [alignment(c.family, along(c.family.mesh)) for c in self.choices]
+            self.choices = [c for c, a in zip(self.choices, aligned) if a == max(aligned)][:1]
 
     def _add(self, meshes: Sequence[Mesh]) -> None:
         """Add the families of lines of quad meshes."""

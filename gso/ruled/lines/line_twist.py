@@ -12,6 +12,7 @@ import numpy as np
 from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import vertex_normals
 from gso.ruled.lines.line_families import Family
+from gso.typing import Array
 
 #: Power of the mean over faces, as for sagittas.
 _POWER = 4
@@ -33,17 +34,8 @@ def twist(family: Family) -> tuple[float, float]:
     curvature : float
     width : float
     """
-    mesh = family.mesh
-    # The first edge of each face is along the strips.
-    faces = np.where(family.along[:, None] == 0, mesh.faces, np.roll(mesh.faces, -1, axis=1))
-    p, n = mesh.vertices[faces], vertex_normals(mesh)[faces]
-
-    def halves(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return 0.5 * (x[:, 1] + x[:, 2] - x[:, 0] - x[:, 3]), 0.5 * (
-            x[:, 3] + x[:, 2] - x[:, 0] - x[:, 1]
-        )
-
-    (a, b), (da, db) = halves(p), halves(n)
+    a, b = _steps(family, family.mesh.vertices)
+    da, db = _steps(family, vertex_normals(family.mesh))
     length, area = lengths(a), lengths(cross(a, b))
     good = (length > 0) & (area > 0)
     a, b, da, db, length, area = (x[good] for x in (a, b, da, db, length, area))
@@ -58,3 +50,25 @@ def twist(family: Family) -> tuple[float, float]:
     curvature = float((area @ added**_POWER / area.sum()) ** (1.0 / _POWER))
     rows = int(family.row.max()) + 1
     return curvature, float(area.sum() / (length.sum() / rows))
+
+
+def alignment(family: Family, directions: Array) -> float:
+    """Return the mean cosine of the angles between lines and directions (m, 3) at the faces."""
+    a, b = _steps(family, family.mesh.vertices)
+    normal = cross(a, b)
+    area, upright = lengths(normal), unit(normal)
+    inside = directions - np.einsum("kd,kd->k", directions, upright)[:, None] * upright
+    cosine = np.abs(np.einsum("kd,kd->k", unit(inside), unit(a)))
+    # Where a direction is along the normal, no line follows it.
+    weight = area * lengths(inside)
+    return float(weight @ cosine / max(weight.sum(), 1e-300))
+
+
+def _steps(family: Family, values: Array) -> tuple[Array, Array]:
+    """Return the steps (m, d) of values (n, d) along the strips and across them, in each face."""
+    faces = family.mesh.faces
+    # The first edge of each face is along the strips.
+    x = values[np.where(family.along[:, None] == 0, faces, np.roll(faces, -1, axis=1))]
+    return 0.5 * (x[:, 1] + x[:, 2] - x[:, 0] - x[:, 3]), 0.5 * (
+        x[:, 3] + x[:, 2] - x[:, 0] - x[:, 1]
+    )

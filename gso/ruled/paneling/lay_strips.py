@@ -9,16 +9,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gso.constraints import Constraint
 from gso.cut_pieces import Pieces
-from gso.errors import ConvergenceWarning, GSOError, MeshError
+from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of, warning
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.result import Result
 from gso.ruled.lines import LineStrips
+from gso.ruled.paneling.along import Along
 from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
@@ -55,6 +57,7 @@ def strips(
     options: str | Options = "balanced",
     constraints: Sequence[Constraint] = (),
     sheet: tuple[Length, Length] | None = None,
+    along: str | ArrayLike | None = None,
     unit: str = "mm",
     x0: MeshLike | Start | None = None,
     workers: int | None = 0,
@@ -170,11 +173,21 @@ def strips(
         ),
         as_sheet(sheet, unit),
         constraints=constraints,
+        along=Along.of(along),
         start=x0 if isinstance(x0, Start) else Start(x0),
         verdict=verdict,
         workers=workers,
         callback=callback,
     )
+    if request.along is not None:
+        alone = request.options.number == 1 or (
+            request.options.number is None and request.max_deviation is None
+        )
+        if alone or request.constraints:
+            raise OptionError(
+                "along takes strips=2 or more, or max_deviation, and no constraints; give one of "
+                "the first two, and leave constraints out"
+            )
     result = lay_strips(mesh, request)
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=2)
@@ -242,7 +255,7 @@ class _Task:
     def divisible(self) -> bool:
         """Whether pieces are tried where the whole does not hold the limits."""
         asked = self.request
-        named = asked.options.number is not None or asked.constraints
+        named = asked.options.number is not None or asked.constraints or asked.along is not None
         return self.division is not None or (asked.max_deviation is not None and not named)
 
     def solved(self) -> Result:
@@ -257,6 +270,11 @@ class _Task:
                 tried += way(light, tried)
                 if tried and tried[-1].ended:
                     return self._answer(tried)
+            if not tried and self.request.along is not None:
+                raise MeshError(
+                    "no strips run along the given direction: this takes a disk or a tube of one "
+                    "component, or quads; leave `along` out"
+                )
             if not (tried or self.divisible):
                 least, number = self._least, asked.options.number
                 if number is not None and 1 < number < least:
@@ -286,6 +304,8 @@ class _Task:
         Many strips along lines are far nearer than others, which are tried only where those along
         lines fail. Where a number is looked for, others are tried if they may be fewer.
         """
+        if self.request.along is not None:
+            return (self._along_lines,)
         if self._many or self._counted:
             return self._as_it_is, self._along_lines, self._as_a_whole
         return self._as_it_is, self._as_a_whole, self._along_lines
@@ -379,10 +399,11 @@ class _Task:
     @cached_property
     def _lines(self) -> LineStrips | None:
         """The strips along the design's own lines, if it has any."""
-        design, constraints = self.design, self.request.constraints
-        if constraints or len(np.unique(design.components[design.used])) > 1:
+        design, asked = self.design, self.request
+        allowed = asked.options.lines and not asked.constraints
+        if not allowed or len(np.unique(design.components[design.used])) > 1:
             return None
-        return lines_of(design, self.request)
+        return lines_of(design, asked)
 
     @property
     def _least(self) -> int:

@@ -40,6 +40,9 @@ class Options(BaseOptions):
     min_radius : float or None
         Smallest radius of the bends, in the unit of the mesh; a result with a smaller one is not
         usable.
+    lines : bool
+        Whether several strips may run along lines of the design, or of a grid laid over it: they
+        are mostly nearer, but only others become smooth surfaces in CAD files.
     starts : tuple of str
         Surfaces whose normals give first rulings: "design", "curvature" (the design made
         developable by that formulation). The best result of all is kept. A warm start `x0`
@@ -58,6 +61,7 @@ class Options(BaseOptions):
     flats: bool = False
     max_crease: float | None = None
     min_radius: float | None = None
+    lines: bool = True
     starts: tuple[str, ...] = _STARTS
 
     def __post_init__(self) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gso.constraints import Constraint
+from gso.ruled.paneling.along import Along
 from gso.ruled.paneling.options import Options
 from gso.seams.options import CHANGES
 from gso.solver import Callback
@@ -41,6 +42,8 @@ class StripsRequest:
         Edges of the design that are cut in any case.
     constraints : sequence of Constraint
     start : Start
+    along : Along or None
+        What strips are to run along.
     verdict : bool
         Whether to judge the result.
     as_it_is : bool
@@ -59,6 +62,7 @@ class StripsRequest:
     kept: Ints = field(default_factory=_no_edges)
     constraints: Sequence[Constraint] = ()
     start: Start = field(default_factory=Start)
+    along: Along | None = None
     verdict: bool = True
     as_it_is: bool = True
     workers: int | None = 0
@@ -90,6 +94,7 @@ class StripsRequest:
         """Whether nothing is asked for that a design which is developable as it is may not have."""
         options = self.options
         named = options.number is not None or options.max_crease is not None
+        named = named or self.along is not None
         return self.as_it_is and not (named or self.constraints or self.start.points is not None)
 
     @property

@@ -201,7 +201,12 @@ def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
         return request.goes_on(progress)
 
     mesh = design.replaced((design.vertices - centre) / size)
-    lines = LineStrips(mesh, told, lambda: grid_copies(mesh))
+    along = None if request.along is None else request.along.moved(centre, size)
+    if along is None:
+        lines = LineStrips(mesh, told, lambda: grid_copies(mesh))
+    else:
+        ways = along.directions(Mesh(mesh.vertices, mesh.triangles))
+        lines = LineStrips(mesh, told, lambda: grid_copies(mesh, ways), along.directions)
     return lines if lines.choices else None
 
 

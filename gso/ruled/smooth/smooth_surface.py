@@ -83,7 +83,7 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     Raises
     ------
     MeshError
-        The design was kept as it is, several strips run along the lines of a quad mesh, the surface
+        The design was kept as it is, several strips run along lines of a mesh, the surface
         was read from a file of an earlier version, or its outline cannot be carried over to the
         smooth strips.
 
@@ -101,7 +101,7 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     source, mesh = surface.untrimmed, surface.mesh
     if source is None:
         raise MeshError(
-            "strips along the lines of a quad mesh, designs that were kept as they are, and those "
+            "strips along lines of a mesh, designs that were kept as they are, and those "
             "in files of an earlier version, have no smooth surfaces; take the planar faces, "
             "gso.io.save_faces"
         )
