@@ -1,9 +1,13 @@
-"""Strips that are longer than a sheet, divided across: along rulings, or between two of them."""
+"""Strips that are longer than a sheet, divided across.
+
+Joints are along rulings, between two of them, or, where rulings are slanted, straight across them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +21,8 @@ from gso.typing import Array, Ints
 
 #: Share of the distance between two rulings up to which a joint is moved to one of them.
 _NEAR = 0.1
+#: Places, in widths of the strip, at which a joint across is tried.
+_SHIFTS = (-0.03, -0.02, -0.01, 0.0, 0.01, 0.02, 0.03)
 
 
 def divided_to_fit(
@@ -58,25 +64,24 @@ def divided_to_fit(
 
 #: A vertex of a pattern, or a place between two: both, and the share of the way.
 _Place = tuple[int, int, float]
+#: A polygon that a joint divides, -1 along a ruling, and the ends of the joint there.
+_Piece = tuple[int, _Place, _Place]
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """A line across a strip, between places on both of its sides, in a polygon or along a ruling.
+    """A line across a strip.
 
     Attributes
     ----------
     strip : int
         A polygon of the strip.
-    cell : int
-        The polygon that it divides; -1 along a ruling.
-    one, two : _Place
+    pieces : tuple of _Piece
+        The line in each polygon that it divides, or along a ruling.
     """
 
     strip: int
-    cell: int
-    one: _Place
-    two: _Place
+    pieces: tuple[_Piece, ...]
 
 
 @dataclass(frozen=True)
@@ -162,12 +167,85 @@ class _Strips:
         at = ends[0] + np.cumsum(np.r_[0.0, lengths(np.diff(middle, axis=0))])
         whole = float(at[-1]) + ends[1]
         for count in range(2, 2 * len(path) + 1):
-            wanted = whole * np.arange(1, count) / count
-            found = [self._joint(hinges, path, at, place) for place in wanted.tolist()]
-            joints = list(dict.fromkeys(found))
-            if all(fits(part) for part in self._parts(path, joints)):
-                return joints
+            wanted = (whole * np.arange(1, count) / count).tolist()
+            along = [self._joint(hinges, path, at, place) for place in wanted]
+            across = [self._across(hinges, path, at, place) for place in wanted]
+            for found in (along, across):
+                joints = [joint for joint in dict.fromkeys(found) if joint is not None]
+                if joints and all(fits(part) for part in self._parts(path, joints)):
+                    return joints
         return []
+
+    def _across(self, hinges: Ints, path: Ints, at: Array, wanted: float) -> _Joint | None:
+        """Return the joint straight across the strip at a distance from the begin, if there is one.
+
+        Of several places nearby, that is taken whose ends are the farthest from vertices.
+        """
+        flat = self.surface.pattern.flat
+        if not at[0] < wanted < at[-1]:
+            return None
+        ends = flat[self.rulings[hinges]]
+        width = float(np.median(lengths(ends[:, 1] - ends[:, 0])))
+
+        def middle(place: float) -> Array:
+            return np.array([np.interp(place, at, x) for x in ends.mean(axis=1).T])
+
+        way = middle(wanted + 0.5 * width) - middle(wanted - 0.5 * width)
+        way = way / max(float(np.hypot(*way)), 1e-300)
+        beyond = {
+            (min(a, b), max(a, b)): (int(one), int(two))
+            for (a, b), (one, two) in zip(
+                self.rulings[hinges].tolist(), self.pairs[hinges].tolist(), strict=True
+            )
+        }
+        best, most = None, 0.0
+        for shift in width * np.array(_SHIFTS):
+            place = float(np.clip(wanted + shift, at[0], at[-1]))
+            off = (flat - middle(place)) @ way
+            start = int(path[int(np.searchsorted(at, place))])
+            pieces = self._crossed(off, start, beyond)
+            clear = min(
+                (abs(float(off[v])) for _, *two in pieces for a, b, _ in two for v in (a, b)),
+                default=0.0,
+            )
+            if clear > most:
+                best, most = _Joint(start, tuple(pieces)), clear
+        return best
+
+    def _crossed(
+        self, off: Array, start: int, beyond: dict[tuple[int, int], tuple[int, int]]
+    ) -> list[_Piece]:
+        """Return the pieces of a line from a polygon to both sides of the strip; else none.
+
+        Parameters
+        ----------
+        off : ndarray, (n,)
+            Distances of the pattern's vertices from the line, with sign.
+        start : int
+        beyond : dict
+            The polygons on both sides of each ruling.
+        """
+        pieces: list[_Piece] = []
+        todo: list[tuple[int, tuple[int, int] | None]] = [(start, None)]
+        while todo:
+            cell, entry = todo.pop()
+            ring = self.rings[cell].tolist()
+            edges = [
+                (min(a, b), max(a, b))
+                for a, b in zip(ring, ring[1:] + ring[:1], strict=True)
+                if off[a] * off[b] < 0
+            ]
+            if len(edges) != 2 or (entry is not None and entry not in edges):
+                return []
+            one, two = ((a, b, float(off[a] / (off[a] - off[b]))) for a, b in edges)
+            pieces.append((cell, one, two))
+            for edge in edges:
+                if edge != entry and edge in beyond:
+                    first, second = beyond[edge]
+                    todo.append((second if first == cell else first, edge))
+            if len(pieces) > len(self.rings):
+                return []
+        return pieces
 
     def _joint(self, hinges: Ints, path: Ints, at: Array, wanted: float) -> _Joint:
         """Return the joint at a distance from the begin, or at a ruling near to it."""
@@ -178,7 +256,7 @@ class _Strips:
                 return self._between(int(path[k]), int(hinges[k - 1]), int(hinges[k]), share)
             k -= int(share <= _NEAR)
         a, b = self.rulings[hinges[min(k, len(at) - 1)]].tolist()
-        return _Joint(int(path[0]), -1, (a, a, 0.0), (b, b, 0.0))
+        return _Joint(int(path[0]), ((-1, (a, a, 0.0), (b, b, 0.0)),))
 
     def _between(self, cell: int, before: int, after: int, share: float) -> _Joint:
         """Return the joint between two rulings of a polygon."""
@@ -190,7 +268,8 @@ class _Strips:
         mid = next(i for i in range(len(ring) - 1) if {ring[i], ring[i + 1]} == there)
         flat = self.surface.pattern.flat
         one = _along(flat, ring[: mid + 1], share)
-        return _Joint(cell, cell, one, _along(flat, ring[mid + 1 :], 1.0 - share))
+        two = _along(flat, ring[mid + 1 :], 1.0 - share)
+        return _Joint(cell, ((cell, one, two),))
 
     def _parts(self, path: Ints, joints: list[_Joint]) -> list[Array]:
         """Return the vertices (k, 2) of the parts between joints of a strip."""
@@ -218,7 +297,7 @@ class _Strips:
         own = {cell: vertex[ring].tolist() for cell, ring in enumerate(self.rings)}
         nodes = _Nodes(surface.mesh.vertices, own)
         rings, lines = nodes.divided(vertex, joints)
-        rulings = vertex[self.rulings]
+        rulings = nodes.pieces(vertex[self.rulings])
         kept = np.array([(min(a, b), max(a, b)) not in lines for a, b in rulings.tolist()], bool)
         none = np.empty((0, 3), np.int64)
         polygons = Polygons(
@@ -266,7 +345,11 @@ class _Nodes:
             For each vertex of the pattern, that of the polygons.
         joints : list of _Joint
         """
-        lines = [(j.cell, self.at(vertex, j.one), self.at(vertex, j.two)) for j in joints]
+        lines = [
+            (cell, self.at(vertex, one), self.at(vertex, two))
+            for joint in joints
+            for cell, one, two in joint.pieces
+        ]
         self.insert()
         every = {cell: [ring] for cell, ring in self.rings.items()}
         for cell, a, b in lines:
@@ -287,6 +370,15 @@ class _Nodes:
             known[share] = len(self.points)
             self.points.append((1.0 - share) * self.vertices[a] + share * self.vertices[b])
         return known[share]
+
+    def pieces(self, edges: Ints) -> Ints:
+        """Return edges (k, 2) divided at their new vertices."""
+        out = []
+        for a, b in edges.tolist():
+            between = sorted(self._new.get((min(a, b), max(a, b)), {}).items(), reverse=a > b)
+            chain = [a, *(number for _, number in between), b]
+            out += list(pairwise(chain))
+        return np.array(out, np.int64).reshape(-1, 2)
 
     def insert(self) -> None:
         """Insert the new vertices into all polygons with their edges."""

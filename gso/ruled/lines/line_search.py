@@ -77,7 +77,7 @@ class LineStrips:
         self._fitters: list[LineFitter] = []
         self._add([mesh])
         if self.least != 1 or along is not None:
-            self._add_copies()
+            self.add_copies()
         if along is not None:
             aligned = [alignment(c.family, along(c.family.mesh)) for c in self.choices]
             self.choices = [c for c, a in zip(self.choices, aligned) if a == max(aligned)][:1]
@@ -88,7 +88,7 @@ class LineStrips:
             with contextlib.suppress(MeshError):
                 self.choices += [Choice(family) for family in families(mesh)]
 
-    def _add_copies(self) -> bool:
+    def add_copies(self) -> bool:
         """Add the lines of copies, and return whether there are more lines now."""
         before, copies, self._copies = len(self.choices), self._copies, tuple
         self._add(copies())
@@ -155,7 +155,7 @@ class LineStrips:
         own = len(self.choices)
         tried = self._tried(count, limit, self.choices)
         poor = all(_distance(found) > (False, limit) for found in tried)
-        if poor and not self.stopped and self._add_copies():
+        if poor and not self.stopped and self.add_copies():
             tried += self._tried(count, limit, self.choices[own:])
         if tried:
             best = self.results[count] = min(tried, key=lambda found: found.order)

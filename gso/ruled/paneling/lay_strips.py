@@ -439,6 +439,9 @@ class _Task:
         result = along_lines(self.design, asked, lines, most=most)
         if result is None:
             return []
+        if asked.sheet is not None and against_sheet(result, asked):
+            # Grids are mostly finer than the design, so that strips can be nearly as wide as sheets.
+            lines.add_copies()
         families = range(len(lines.choices))
         result = on_sheets(result, asked, [partial(narrow, k) for k in families])
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
