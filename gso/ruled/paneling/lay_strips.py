@@ -26,6 +26,7 @@ from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
 from gso.ruled.paneling.sheet_strips import against_sheet, divided, longest_ruling, on_sheets
+from gso.ruled.paneling.shop_notes import shop_notes
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import (
     along_lines,
@@ -343,6 +344,7 @@ class _Task:
         best = min(tried, key=lambda one: one.order(few=few))
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
+        best.result.notes += shop_notes(best.result)
         return best.result
 
     def _developable(self) -> list[Tried]:
@@ -440,7 +442,7 @@ class _Task:
         if result is None:
             return []
         if asked.sheet is not None and against_sheet(result, asked):
-            # Grids are mostly finer than the design, so that strips can be nearly as wide as sheets.
+            # Grids are mostly finer than the design: strips can be nearly as wide as sheets.
             lines.add_copies()
         families = range(len(lines.choices))
         result = on_sheets(result, asked, [partial(narrow, k) for k in families])

@@ -32,8 +32,6 @@ from gso.typing import Array
 
 #: Distance of vertices from their places, relative to the diagonal, that counts as zero.
 _SAME = 1e-9
-#: Angle of a fold, in degrees, that a note is made of.
-_SHARP = 45.0
 #: Radius that the solve keeps, relative to the smallest one.
 _SAFE = 1.6
 
@@ -136,13 +134,6 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
     surface = surface.transformed(
         frame.frame.to_user, frame.scale, lambda rows: frame.back("surface", rows)
     )
-    sharpest = np.degrees(surface.rulings.largest_angle)
-    notes = design.notes
-    if sharpest > _SHARP:
-        notes += (
-            f"the surface folds by {sharpest:.0f} degrees at one ruling; more strips, or "
-            "min_radius, bend it more gently",
-        )
     result = StripsResult(
         task="developable",
         formulation=RULED,
@@ -154,7 +145,7 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
         seconds=run.timings.as_dict() | {"strips": time.perf_counter() - clock},
         backend=begun.backend,
         warm_start="cold" if request.start.points is None else request.start.source,
-        notes=notes,
+        notes=design.notes,
         details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
         **StripsResult.attributes(surface),
     )

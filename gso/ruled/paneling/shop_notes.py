@@ -1,0 +1,46 @@
+"""Notes on strips that can be made, but that a workshop should look at before."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.result import Result, StripsResult
+from gso.wording import length
+
+#: Angle of a fold and of a crease, in degrees, that a note is made of.
+_SHARP, _STEEP = 45.0, 90.0
+#: Radius of a bend, relative to the design's size, and share of the area of a part, in %.
+_TIGHT, _SMALL = 1e-3, 0.4
+
+
+def shop_notes(result: Result) -> tuple[str, ...]:
+    """Return notes on sharp folds and creases, tight bends and small parts of strips.
+
+    Nothing for designs that are kept as they are: their folds, bends and parts are meant.
+    """
+    if not isinstance(result, StripsResult) or result.ruled.strain is not None:
+        return ()
+    rulings, creases, size = result.ruled.rulings, result.ruled.creases, result.design.size
+    notes = []
+    sharp = np.degrees(np.abs(rulings.angles))
+    if (folded := int((sharp > _SHARP).sum())) > 0:
+        notes.append(
+            f"the surface folds by up to {sharp.max():.0f} degrees at single rulings ({folded} by "
+            f"more than {_SHARP:g}); more strips, or min_radius, bend it more gently"
+        )
+    tight = int((rulings.radii < _TIGHT * size).sum())
+    if tight:
+        notes.append(
+            f"the smallest bend radius is {length(rulings.smallest_radius)}, and {tight} bends are "
+            f"tighter than {100 * _TIGHT:g} % of the design's size; give min_radius if your "
+            "sheet or press cannot do that"
+        )
+    steep = np.degrees(creases.largest_angle)
+    if steep > _STEEP:
+        notes.append(
+            f"strips meet at up to {steep:.0f} degrees; more strips, or max_crease, lower that"
+        )
+    small = result.metrics["part_area_min"]
+    if small < _SMALL:
+        notes.append(f"the smallest part has only {small:.2g} % of the area of all")
+    return tuple(notes)
