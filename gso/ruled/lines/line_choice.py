@@ -20,7 +20,7 @@ from gso.ruled.lines.line_twist import twist
 from gso.typing import Array, Flags, Ints
 
 #: Largest number of lines across a strip that sagittas are measured on.
-_COLUMNS = 64
+_COLUMNS = 32
 #: Power of the sagittas.
 _POWER = 4
 #: Largest number of lines of a band that creases are chosen from.

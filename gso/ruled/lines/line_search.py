@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso import metrics
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.ruled.lines.free_rulings import free_rulings, single
@@ -91,7 +92,8 @@ class LineStrips:
     def add_copies(self) -> bool:
         """Add the lines of copies, and return whether there are more lines now."""
         before, copies, self._copies = len(self.choices), self._copies, tuple
-        self._add(copies())
+        with contextlib.suppress(MeshError):
+            self._add(copies())
         return len(self.choices) > before
 
     @property
@@ -201,9 +203,14 @@ class LineStrips:
         return found
 
     def _measure(self, found: Found) -> Found:
-        """Return strips with the largest distance of all points."""
-        far = found.surface.distances(self.mesh)
-        return replace(found, surface=replace(found.surface, deviation=far), mean=far.mean)
+        """Return strips with the largest distance of all points, from that of samples."""
+        surface, far = found.surface, found.surface.deviation
+        if far is not None:
+            far = far._replace(
+                there_max=metrics.farthest(surface.mesh, self.mesh, far.there_max),
+                back_max=metrics.farthest(self.mesh, surface.mesh, far.back_max),
+            )
+        return replace(found, surface=replace(surface, deviation=far))
 
     def as_it_is(self, wanted: Wanted) -> Found | None:
         """Return strips that are the mesh itself: the wanted number, or one; else None."""
