@@ -2,7 +2,7 @@
 
 from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
-from gso.parametrization.around import Around, around
+from gso.parametrization.around import Around, around, inside
 from gso.parametrization.embedding import embeddings, flattens, parts, spanned
 from gso.parametrization.initial import begin, flips, given, oriented_triangles, refine, strain
 from gso.parametrization.low_strain import low_strain
@@ -26,6 +26,7 @@ __all__ = [
     "flattens",
     "flips",
     "given",
+    "inside",
     "low_strain",
     "opened",
     "orientation",

@@ -1,4 +1,4 @@
-"""Images of surfaces that close around, on a cylinder that is unrolled."""
+"""Harmonic images with positive weights: of disks, and of tubes on a cylinder that is unrolled."""
 
 from __future__ import annotations
 
@@ -67,16 +67,13 @@ def around(mesh: Mesh) -> Around | None:
     if right is None:
         return None
     own, triangles = opened.vertex, opened.mesh.triangles
-    angles = geometry.corner_angles(opened.mesh.vertices, triangles)
-    cotangent = 0.5 / np.tan(np.clip(angles, 1e-6, np.pi - 1e-6))
     a, b = (np.roll(triangles, -k, axis=1).ravel() for k in (1, 2))
     one, two, count = own[a], own[b], len(whole.vertices)
     wide = 0.5 * sum(perimeter(mesh.vertices[loop]) for loop in (low, high))
     area = 0.5 * float(geometry.doubled_areas(whole.vertices, whole.triangles).sum())
     size = (wide, area / wide)
     best, most = None, _INVERTED * len(triangles)
-    for weights in (np.maximum(cotangent, _LEAST), np.ones(angles.shape)):
-        weight = weights.ravel()
+    for weight in (_weights(opened.mesh), np.ones(triangles.size)):
         step = weight * (right[a].astype(float) - right[b])
         pull = np.asarray(np.bincount(two, step, count) - np.bincount(one, step, count), float)
         # Each edge pulls at its ends by the turn around the cylinder that it takes.
@@ -84,10 +81,35 @@ def around(mesh: Mesh) -> Around | None:
         ends, at = np.r_[low, high], np.repeat([0.0, 1.0], [len(low), len(high)])
         y = _harmonic(one, two, weight, ends, at, np.zeros(count))
         flat = np.stack([x[own] + right, y[own]], axis=1) * size
-        inverted = np.count_nonzero(geometry.signed_areas(flat, triangles) <= 0)
+        inverted = int((geometry.signed_areas(flat, triangles) <= 0).sum())
         if inverted <= most:
             best, most = flat, inverted - 1
     return None if best is None else Around(opened.mesh, best, size)
+
+
+def inside(mesh: Mesh, loop: Ints, at: Array) -> Array:
+    """Return an image (n, 2) of triangles harmonic but for small weights, with given boundary.
+
+    No triangle is inverted where the boundary loop is mapped to a convex curve, as all weights are
+    positive (Tutte 1963, Floater 1997).
+
+    Examples
+    --------
+    >>> square = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.4, 0.5, 0.1]],
+    ...               [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    >>> inside(square, np.arange(4), np.array([[0.0, 0], [2, 0], [2, 2], [0, 2]]))[4].round(1)
+    array([0.8, 1. ])
+    """
+    a, b = (np.roll(mesh.triangles, -k, axis=1).ravel() for k in (1, 2))
+    weight, none = _weights(mesh), np.zeros(len(mesh.vertices))
+    return np.stack([_harmonic(a, b, weight, loop, x, none) for x in at.T], axis=1)
+
+
+def _weights(mesh: Mesh) -> Array:
+    """Return the cotangents at the corners of triangles (3 t,), small and negative ones raised."""
+    angles = geometry.corner_angles(mesh.vertices, mesh.triangles)
+    cotangent = 0.5 / np.tan(np.clip(angles, 1e-6, np.pi - 1e-6))
+    return np.maximum(cotangent, _LEAST).ravel()
 
 
 def _right(mesh: Mesh, vertex: Ints, low: Ints) -> Flags | None:

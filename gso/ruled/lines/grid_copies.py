@@ -24,6 +24,8 @@ _CELLS = (48**2, 64**2)
 _FEW = 12
 #: Number of lines that distances between lines are measured on, and the power of their mean.
 _FINE, _WIDE = 128, 40
+#: Distance of corners along the outline, relative to its length, below which they are one.
+_SAME = 1e-3
 #: Turning of the outline at a corner, in radians.
 _SHARP = np.radians(30.0)
 #: Points around the outline, and how many of them its places are averaged over to smooth it.
@@ -139,7 +141,7 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
     which = np.repeat(np.arange(4), np.diff(start))
     share = (along[:-1] - along[start[which]]) / side[which]
     rim = box[which] + share[:, None] * (box[which + 1] - box[which])
-    image = parametrization.spanned(Mesh(mesh.vertices, mesh.triangles), loop, rim)
+    image = parametrization.inside(mesh, loop, rim)
     rows, columns = _counts(wide, high, len(mesh.triangles))
 
     def placed(one: Array, two: Array) -> Array:
@@ -154,7 +156,7 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
     # Corners of the outline stay.
     index = np.arange(len(points)).reshape(rows + 1, columns + 1)
     border = np.r_[index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]]
-    for k in np.flatnonzero(np.abs(turn) > _SHARP):
+    for k in _distinct(np.flatnonzero(np.abs(turn) > _SHARP), mesh.vertices[loop]):
         at = int(lengths(flat[border] - rim[k]).argmin())
         points[border[at]] = mesh.vertices[loop[k]]
         border = np.delete(border, at)
@@ -186,7 +188,8 @@ def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
             np.roll(mesh.vertices[loop], -1, axis=0) - mesh.vertices[loop],
             np.arange(around),
         )
-        for vertex in loop[np.radians(turns(unit(way))) > _SHARP]:
+        sharp = np.flatnonzero(np.radians(turns(unit(way))) > _SHARP)
+        for vertex in loop[_distinct(sharp, mesh.vertices[loop])]:
             x, y = image.flat[vertex]
             gap = np.abs(one[free] - (x - begin) % wide)
             at = int(np.minimum(gap, wide - gap).argmin())
@@ -195,6 +198,13 @@ def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
     after = np.roll(index, -1, axis=0)
     corners = [index[:, :-1], after[:, :-1], after[:, 1:], index[:, 1:]]
     return Mesh(points, np.stack(corners, axis=-1).reshape(-1, 4))
+
+
+def _distinct(corners: Ints, outline: Array) -> Ints:
+    """Return the corners of a closed outline (n, 3) without those that are nearly the same."""
+    along = arc_lengths(outline)[corners]
+    least = _SAME * float(lengths(np.roll(outline, -1, axis=0) - outline).sum())
+    return corners[np.diff(along, prepend=-np.inf) > least]
 
 
 def _counts(wide: float, high: float, triangles: int) -> tuple[int, int]:
