@@ -21,7 +21,8 @@ from gso import metrics
 from gso.dataset import bezier
 
 #: Options by the name of the row.
-STRIPS = {"1": {"strips": 1}, "tree": {"flats": True}, **{str(k): {"strips": k} for k in (2, 4, 8, 16, 32)}}
+STRIPS = {"1": {"strips": 1}, "tree": {"flats": True}}
+STRIPS |= {str(k): {"strips": k} for k in (2, 4, 8, 16, 32)}
 #: Curvature up to which surfaces of another seed are used.
 _MOST = 0.9
 _quantile = partial(np.quantile, q=0.9)
