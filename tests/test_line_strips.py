@@ -7,6 +7,7 @@ import pytest
 
 import gso
 from gso.mesh import Mesh
+from gso.mesh.cut import cut
 from gso.ruled.lines import LineStrips, families
 
 
@@ -349,3 +350,41 @@ def test_a_direction_takes_several_strips_and_no_constraints():
         gso.strips(dome(5), along="x")
     with pytest.raises(gso.OptionError, match="along takes"):
         gso.strips(dome(5), strips=4, along="x", constraints=[gso.constraints.FixedBoundary()])
+
+
+def stairs(count=31):
+    """Triangles over the squares of a lattice inside a circle: a jagged outline."""
+    i, j = (k - count // 2 for k in np.mgrid[:count, :count])
+    inside = i**2 + j**2 < (0.45 * count) ** 2
+    a, b = np.nonzero(inside[:-1, :-1] & inside[1:, 1:] & inside[1:, :-1] & inside[:-1, 1:])
+    k = a * count + b
+    quads = np.stack([k, k + count, k + count + 1, k + 1], axis=1)
+    points = np.stack([i, j, -0.02 * (i**2 + j**2)], axis=-1).reshape(-1, 3)
+    used = np.unique(quads)
+    mesh = Mesh(points[used], np.searchsorted(used, quads))
+    return Mesh(mesh.vertices, mesh.triangles)
+
+
+def test_outlines_that_have_no_corners_or_many():
+    three = Mesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0.1]], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    )
+    assert len(gso.strips(three, strips=2).mesh.faces)
+    assert gso.strips(stairs(), strips=8).metrics["distance_max"] < 1.0
+
+
+def test_metrics_of_parts_with_slits():
+    tube = gso.as_mesh(sheet("cylinder", count=13))
+    row = tube.grid_index[6, :5]
+    slit = cut(tube, np.stack([row[:-1], row[1:]], axis=1)).mesh
+    found = gso.strips(slit, max_deviation=0.01).metrics
+    assert 0 < found["part_circle_min"] < 2.0 and found["part_area_min"] <= 100.0
+
+
+def test_a_callback_ends_strips_along_a_direction():
+    mesh = gso.as_mesh(dome(9))
+    triangles = Mesh(mesh.vertices, mesh.triangles)
+    result = gso.strips(triangles, strips=4, along="x", callback=lambda progress: False)
+    assert result.status is gso.Status.CANCELLED and result.ruled is None
+    with pytest.raises(gso.MeshError, match="60 strips are too many"):
+        gso.strips(triangles, strips=60, along="x")

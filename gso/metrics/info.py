@@ -64,7 +64,7 @@ INFO: dict[str, Info] = {
     "crease_turn_max": Info("deg", True, "largest turn of a crease at one of its vertices", "max"),
     "crease_turn_mean": Info("deg", True, "turn of creases / % of the diagonal along them"),
     "part_area_min": Info("%", False, "area of the smallest part / that of all", "min"),
-    "part_circle_min": Info("size", False, "smallest largest circle in a part, mesh's unit", "min"),
+    "part_circle_min": Info("size", False, "least diameter of the largest circle in a part", "min"),
     "needles": Info("", True, "faces narrower than 0.1 % of the diagonal, all over", "sum"),
     "angle_distortion_mean": Info("", True, "mean over faces of s1/s2 - 1, principal stretches"),
     "angle_distortion_p99": Info("", True, "99th percentile of s1/s2 - 1"),

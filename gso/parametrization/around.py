@@ -40,8 +40,8 @@ class Around(NamedTuple):
 def around(mesh: Mesh) -> Around | None:
     """Map a surface with two boundary loops and no handle to a cylinder, harmonically.
 
-    The loops become its ends. Around it, points move freely along them, so that the image is
-    nearly conformal. None for other surfaces, and where too many triangles would be inverted.
+    The loops become its ends. Points of the ends move freely around it, so that the image
+    is nearly conformal. None for other surfaces, and where too many triangles would be inverted.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """Strips that are longer than a sheet, divided across.
 
-Joints are along rulings, between two of them, or, where rulings are slanted, straight across them.
+Joints are along rulings or between two of them. Where their parts do not fit, joints run straight
+across the strip.
 """
 
 from __future__ import annotations

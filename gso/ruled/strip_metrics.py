@@ -44,7 +44,7 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
             "bend_radius_min": surface.rulings.smallest_radius,
         }
         | _creases(surface.creases, surface.mesh.vertices, percent)
-        | _parts(surface.pattern)
+        | part_metrics(surface.pattern)
         | {"needles": float((percent * _widths(surface.mesh) < 100.0 * _NEEDLE).sum())}
     )
 
@@ -66,7 +66,7 @@ def _creases(creases: Folds, vertices: Array, percent: float) -> dict[str, float
     }
 
 
-def _parts(pattern: Pattern) -> dict[str, float]:
+def part_metrics(pattern: Pattern) -> dict[str, float]:
     """Return the size of the smallest part of a pattern."""
     import shapely
 
@@ -79,20 +79,22 @@ def _parts(pattern: Pattern) -> dict[str, float]:
     for loops in rings:
         outer, *holes = sorted(loops, key=lambda loop: -abs(signed_area(loop)))
         # Patterns that meet themselves are no valid polygons.
-        region = shapely.make_valid(shapely.Polygon(outer, holes))
-        areas.append(region.area)
-        circle = shapely.maximum_inscribed_circle(region) if region.area else region
-        widths.append(2.0 * shapely.length(circle) if region.area else 0.0)
+        parts = shapely.get_parts(shapely.make_valid(shapely.Polygon(outer, holes)))
+        largest = max(parts, key=shapely.area)
+        area = float(shapely.area(parts).sum())
+        areas.append(area)
+        circle = shapely.maximum_inscribed_circle(largest) if area else None
+        widths.append(0.0 if circle is None else 2.0 * shapely.length(circle))
     return {
-        "part_area_min": 100.0 * min(areas) / sum(areas),
+        "part_area_min": 100.0 * min(areas) / max(sum(areas), 1e-300),
         "part_circle_min": float(min(widths)),
     }
 
 
 def _widths(mesh: Mesh) -> Array:
-    """Return the largest widths of faces (m,): twice the area over the longest side."""
+    """Return the widths of faces (m,): heights of triangles, of quads area over longest side."""
     corners = four_corners(mesh.faces)
     p = mesh.vertices[corners]
     side = lengths(np.roll(p, -1, axis=1) - p).max(axis=1)
     double = lengths(geometry.quad_area_vectors(mesh.vertices, corners))
-    return np.asarray(double / side)
+    return np.asarray(np.where(corners[:, 0] == corners[:, 3], 1.0, 0.5) * double / side)

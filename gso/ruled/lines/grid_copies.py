@@ -26,6 +26,9 @@ _FEW = 12
 _FINE, _WIDE = 128, 40
 #: Distance of corners along the outline, relative to its length, below which they are one.
 _SAME = 1e-3
+#: Shortest side of a grid, relative to the length of the outline; difference of turning angles, in
+#: radians, of corners that are equally sharp.
+_SHORT, _ALIKE = 0.05, 1e-3
 #: Turning of the outline at a corner, in radians.
 _SHARP = np.radians(30.0)
 #: Points around the outline, and how many of them its places are averaged over to smooth it.
@@ -55,14 +58,19 @@ def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
     if len(mesh.boundary_loops) != 1 or not parametrization.flattens(mesh):
         return []
     (loop,) = mesh.boundary_loops
+    if len(loop) < 4:
+        return []
     flat = parametrization.begin(mesh).flat
     flat = flat if signed_area(flat[loop]) > 0 else flat * [1.0, -1.0]
     outline = flat[loop]
     turn = turning(outline)
     found: list[Ints] = []
     if along is None:
-        sharpest = np.sort(np.argsort(-turn, kind="stable")[:4])
-        if turn[sharpest].min() > _SHARP:
+        order = np.argsort(-turn, kind="stable")
+        sharpest = np.sort(order[:4])
+        # Of more corners that are as sharp, four would be chosen by their numbers.
+        alone = len(turn) == 4 or turn[order[3]] > turn[order[4]] + _ALIKE
+        if turn[sharpest].min() > _SHARP and alone and _apart(flat[loop], sharpest):
             found.append(sharpest)
     angle = _principal(mesh, flat) if along is None else _direction(mesh, flat, along)
     corners = _touching(outline, turn, angle)
@@ -156,10 +164,15 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
     # Corners of the outline stay.
     index = np.arange(len(points)).reshape(rows + 1, columns + 1)
     border = np.r_[index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]]
-    for k in _distinct(np.flatnonzero(np.abs(turn) > _SHARP), mesh.vertices[loop]):
-        at = int(lengths(flat[border] - rim[k]).argmin())
-        points[border[at]] = mesh.vertices[loop[k]]
-        border = np.delete(border, at)
+    step = max(float(np.diff(one).max()), float(np.diff(two).max()))
+    free = np.ones(len(border), bool)
+    for k in _distinct(np.flatnonzero(np.abs(turn) > _SHARP), mesh.vertices[loop], len(border)):
+        gap = lengths(flat[border] - rim[k])
+        at = int(gap.argmin())
+        # A second corner at the same place takes its neighbour, and others stay as they are.
+        at = at if free[at] else int(np.where(free, gap, np.inf).argmin())
+        if gap[at] <= 1.5 * step:
+            points[border[at]], free[at] = mesh.vertices[loop[k]], False
     return Mesh.from_grid(points.reshape(rows + 1, columns + 1, 3))
 
 
@@ -189,7 +202,7 @@ def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
             np.arange(around),
         )
         sharp = np.flatnonzero(np.radians(turns(unit(way))) > _SHARP)
-        for vertex in loop[_distinct(sharp, mesh.vertices[loop])]:
+        for vertex in loop[_distinct(sharp, mesh.vertices[loop], around)]:
             x, y = image.flat[vertex]
             gap = np.abs(one[free] - (x - begin) % wide)
             at = int(np.minimum(gap, wide - gap).argmin())
@@ -200,11 +213,22 @@ def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
     return Mesh(points, np.stack(corners, axis=-1).reshape(-1, 4))
 
 
-def _distinct(corners: Ints, outline: Array) -> Ints:
-    """Return the corners of a closed outline (n, 3) without those that are nearly the same."""
+def _distinct(corners: Ints, outline: Array, places: int) -> Ints:
+    """Return the corners of a closed outline (n, 3) without those that are nearly the same.
+
+    None of a jagged outline, which has more of them than a third of the places on the border.
+    """
     along = arc_lengths(outline)[corners]
     least = _SAME * float(lengths(np.roll(outline, -1, axis=0) - outline).sum())
-    return corners[np.diff(along, prepend=-np.inf) > least]
+    kept = corners[np.diff(along, prepend=-np.inf) > least]
+    return kept if 3 * len(kept) <= places else kept[:0]
+
+
+def _apart(outline: Array, corners: Ints) -> bool:
+    """Return whether corners divide a closed outline into sides that are not very short."""
+    along = arc_lengths(np.vstack([outline, outline[:1]]))
+    side = np.diff(np.r_[along[corners], along[-1] + along[corners[0]]])
+    return bool(side.min() > _SHORT * along[-1])
 
 
 def _counts(wide: float, high: float, triangles: int) -> tuple[int, int]:
@@ -223,7 +247,8 @@ def _spread(places: Array, points: Array, count: int) -> Array:
     points : ndarray, (k, c, 3)
         Points of the surface on the line at each place.
     """
-    step = (lengths(np.diff(points, axis=0)) ** _WIDE).mean(axis=1) ** (1.0 / _WIDE)
+    step = lengths(np.diff(points, axis=0))
+    step = ((step / max(float(step.max()), 1e-300)) ** _WIDE).mean(axis=1) ** (1.0 / _WIDE)
     along = np.r_[0.0, np.cumsum(step)]
     return np.interp(np.linspace(0.0, along[-1], count), along, places)
 

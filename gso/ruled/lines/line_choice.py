@@ -2,8 +2,8 @@
 
 Between two creases rulings are straight. The distance of the design's lines across from these
 chords is the sagitta, width^2 x curvature / 8. The program minimises the mean of its fourth power,
-between mean and maximum, over all choices of a number of lines. Widths then follow the square root
-of the curvature across.
+between mean and maximum, over all choices of a number of lines. Widths are then
+larger where the curvature across is smaller: they follow one over its square root.
 """
 
 from __future__ import annotations

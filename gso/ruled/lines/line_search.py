@@ -26,6 +26,8 @@ from gso.typing import Array, Ints
 LINES = "lines"
 #: Families that are tried, and the ratio of their rank to the smallest up to which.
 _FAMILIES, _RATIO = 2, 2.0
+#: Share of the best alignment with given directions from which on lines count as aligned.
+_ALIGNED = 0.98
 #: Ratio of ranks up to which both are tried in any case.
 _ALIKE = 1.25
 #: Share of the rank up to which the mean distance of sound strips is as good as can be expected.
@@ -60,6 +62,11 @@ class LineStrips:
     along : callable, optional
         Returns unit directions (m, 3) at the faces of a mesh. Strips run only along the family of
         lines that is the nearest to them.
+
+    Attributes
+    ----------
+    aligned : float
+        Mean cosine of the angles between these lines and the directions; 1 without directions.
     """
 
     def __init__(
@@ -76,12 +83,16 @@ class LineStrips:
         self._measured: set[int] = set()
         self.choices: list[Choice] = []
         self._fitters: list[LineFitter] = []
+        self.aligned = 1.0
         self._add([mesh])
         if self.least != 1 or along is not None:
             self.add_copies()
         if along is not None:
             aligned = [alignment(c.family, along(c.family.mesh)) for c in self.choices]
-            self.choices = [c for c, a in zip(self.choices, aligned) if a == max(aligned)][:1]
+            least = _ALIGNED * max(aligned, default=0.0)
+            # The design's own lines come first.
+            self.choices = [c for c, a in zip(self.choices, aligned, strict=True) if a >= least][:1]
+            self.aligned = max(aligned, default=0.0)
 
     def _add(self, meshes: Sequence[Mesh]) -> None:
         """Add the families of lines of quad meshes."""

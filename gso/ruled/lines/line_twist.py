@@ -23,7 +23,8 @@ def twist(family: Family) -> tuple[float, float]:
 
     With the second fundamental form (L, M; M, N) along and straight across the lines, rulings
     conjugate to them have the normal curvature N - M^2 / L per squared width of the strip. The
-    curvature added is the mean of M^2 / L, or of M where that is smaller.
+    curvature added is the mean of M^2 / L, or of M where that is smaller, of fourth powers as for
+    sagittas.
 
     Parameters
     ----------

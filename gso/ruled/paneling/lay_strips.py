@@ -34,6 +34,7 @@ from gso.ruled.paneling.surface_strips import (
     check_whole,
     lines_of,
     of_surface,
+    unsolved,
 )
 from gso.ruled.paneling.tried_strips import Tried
 from gso.seams import Edges, Segmentation, cut
@@ -73,12 +74,12 @@ def strips(
     does not close around.
 
     Otherwise the design is tried as one surface, with as few strips side by side as hold
-    `max_deviation`. On quad meshes strips along the design's own lines are tried, too, which may
-    close around. Where neither holds it, the design is cut into pieces without darts, which become
-    developable together, and are divided by rulings between shared points of their seams. Where
-    that does not hold the limits, each piece becomes strips that follow it. With a sheet, strips
-    that are too long are divided across, but for those whose rulings branch. The result that
-    holds the limits is returned, or else the closest.
+    `max_deviation`. Strips along lines are tried, too, which may close around: the lines of a quad
+    mesh, or of a grid laid over a disk or a tube. Where neither holds it, the design is cut into
+    pieces without darts, which become developable together, and are divided by rulings between
+    shared points of their seams. Where that does not hold the limits, each piece becomes strips
+    that follow it. With a sheet, strips that are too long are divided across, but for those whose
+    rulings branch. The result that holds the limits is returned, or else the closest.
 
     Parameters
     ----------
@@ -115,6 +116,11 @@ def strips(
     sheet : (float, float), optional
         Length and width of a sheet that every part must fit on, in millimetres, or texts such
         as "3m".
+    along : {"x", "y", "z"}, array_like (3,) or (n, 3), optional
+        What strips run along: a direction, or the points of a line, in the mesh's unit, that those
+        nearby follow. Of the design's own lines, and those of a grid laid over it in this
+        direction, the nearest are taken. The design is not cut. It takes a number of strips above
+        one, or `max_deviation`.
     unit : {"mm", "um", "cm", "dm", "m", "in", "ft", "yd"}
         Unit of the coordinates.
     x0 : Mesh, array or Start, optional
@@ -141,7 +147,7 @@ def strips(
         The design cannot be used: it has several components, or it is closed, or has a handle,
         and may not be cut.
     OptionError
-        An option or constraint is wrong.
+        An option or constraint is wrong, or does not go with `along`.
 
     Examples
     --------
@@ -184,10 +190,11 @@ def strips(
         alone = request.options.number == 1 or (
             request.options.number is None and request.max_deviation is None
         )
-        if alone or request.constraints:
+        barred = request.constraints or not request.options.lines or isinstance(mesh, Pieces)
+        if alone or barred:
             raise OptionError(
-                "along takes strips=2 or more, or max_deviation, and no constraints; give one of "
-                "the first two, and leave constraints out"
+                "along takes strips=2 or more, or max_deviation, a design that is not in pieces, "
+                "no constraints, and not lines=False"
             )
     result = lay_strips(mesh, request)
     if said := warning(result):
@@ -271,11 +278,11 @@ class _Task:
                 tried += way(light, tried)
                 if tried and tried[-1].ended:
                     return self._answer(tried)
+            lines = self._lines
+            if not tried and lines is not None and lines.stopped:
+                return unsolved(self.design, self.request)
             if not tried and self.request.along is not None:
-                raise MeshError(
-                    "no strips run along the given direction: this takes a disk or a tube of one "
-                    "component, or quads; leave `along` out"
-                )
+                raise MeshError(_unaligned(lines, self.request.options.number))
             if not (tried or self.divisible):
                 least, number = self._least, asked.options.number
                 if number is not None and 1 < number < least:
@@ -400,9 +407,11 @@ class _Task:
 
     @cached_property
     def _lines(self) -> LineStrips | None:
-        """The strips along the design's own lines, if it has any."""
+        """The strips along lines of the design or of a grid laid over it, if there are any."""
         design, asked = self.design, self.request
         allowed = asked.options.lines and not asked.constraints
+        # A single strip has its rulings along lines of quads only.
+        allowed = allowed and not (asked.options.number == 1 and design.has_triangles)
         if not allowed or len(np.unique(design.components[design.used])) > 1:
             return None
         return lines_of(design, asked)
@@ -414,10 +423,12 @@ class _Task:
 
     def _as_it_is(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         """Return strips that are the design itself, if there are any along its lines."""
-        return [] if self._lines is None else self._of_lines(self._lines, 0)
+        if self._lines is None or self.design.has_triangles:
+            return []
+        return self._of_lines(self._lines, 0)
 
     def _along_lines(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
-        """Return strips along the design's own lines, if they may be better than the others."""
+        """Return strips along lines, if they may be better than the others."""
         lines, asked, most = self._lines, self.request, None
         if lines is None:
             return []
@@ -456,6 +467,19 @@ class _Task:
         result, reasons = of_pieces(light, asked, division)
         result = divided(result, asked)
         return Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
+
+
+def _unaligned(lines: LineStrips | None, number: int | None) -> str:
+    """Return why no strips run along a direction."""
+    if lines is not None and number is not None and not lines.least <= number <= lines.most:
+        return (
+            f"{number} strips are too {'few' if number < lines.least else 'many'} along the given "
+            f"direction; ask for {lines.least} to {lines.most}"
+        )
+    return (
+        "no strips run along the given direction: this takes one component of quads, or a disk or "
+        "a tube; leave `along` out"
+    )
 
 
 def _read(given: MeshLike | Pieces) -> Mesh:

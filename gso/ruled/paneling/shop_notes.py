@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.result import Result, StripsResult
+from gso.ruled.strip_metrics import part_metrics
 from gso.wording import length
 
 #: Angle of a fold and of a crease, in degrees, that a note is made of.
@@ -24,23 +25,24 @@ def shop_notes(result: Result) -> tuple[str, ...]:
     notes = []
     sharp = np.degrees(np.abs(rulings.angles))
     if (folded := int((sharp > _SHARP).sum())) > 0:
+        where = "one ruling" if folded == 1 else f"{folded} rulings, each on its own"
         notes.append(
-            f"the surface folds by up to {sharp.max():.0f} degrees at single rulings ({folded} by "
-            f"more than {_SHARP:g}); more strips, or min_radius, bend it more gently"
+            f"the surface folds by up to {sharp.max():.0f} degrees at {where}; more strips, or "
+            "min_radius, bend it more gently"
         )
     tight = int((rulings.radii < _TIGHT * size).sum())
     if tight:
+        bends = "one bend is" if tight == 1 else f"{tight} bends are"
         notes.append(
-            f"the smallest bend radius is {length(rulings.smallest_radius)}, and {tight} bends are "
-            f"tighter than {100 * _TIGHT:g} % of the design's size; give min_radius if your "
-            "sheet or press cannot do that"
+            f"{bends} tighter than {100 * _TIGHT:g} % of the design's size, with radii from "
+            f"{length(rulings.smallest_radius)}; give min_radius if that cannot be bent"
         )
     steep = np.degrees(creases.largest_angle)
     if steep > _STEEP:
         notes.append(
             f"strips meet at up to {steep:.0f} degrees; more strips, or max_crease, lower that"
         )
-    small = result.metrics["part_area_min"]
+    small = part_metrics(result.ruled.pattern)["part_area_min"]
     if small < _SMALL:
         notes.append(f"the smallest part has only {small:.2g} % of the area of all")
     return tuple(notes)

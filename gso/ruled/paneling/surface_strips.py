@@ -28,8 +28,11 @@ from gso.status import Progress, Status
 from gso.tasks.base import Solution
 from gso.tasks.developable import Options as DevelopableOptions
 from gso.tasks.request import Request
+from gso.tasks.start import Start
 from gso.typing import Array
 
+#: Angle of lines to the direction that they are to follow, in degrees, that a note is made of.
+_OFF = 25.0
 #: Distance of vertices from their places, relative to the diagonal, that counts as zero.
 _SAME = 1e-9
 #: Radius that the solve keeps, relative to the smallest one.
@@ -153,6 +156,15 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
     return result
 
 
+def unsolved(design: Mesh, request: StripsRequest) -> Result:
+    """Return a design for which the callback ended the solve before there were strips."""
+    options = replace(request.options, starts=("design",))
+    own = replace(request, options=options, constraints=(), start=Start(None))
+    begun, run = _begin(case_of(design, own), own)
+    begun.status = Status.CANCELLED
+    return pack(run, begun)
+
+
 def _parts(found: Found) -> int:
     """Return the number of parts of the strips."""
     return int(found.surface.pattern.mesh.components.max()) + 1
@@ -255,10 +267,18 @@ def along_lines(
         seconds={"strips": time.perf_counter() - clock},
         backend="",
         warm_start="cold",
-        notes=design.notes,
+        notes=design.notes + _off(lines, request),
         details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
         **StripsResult.attributes(surface),
     )
+
+
+def _off(lines: LineStrips, request: StripsRequest) -> tuple[str, ...]:
+    """Return a note if lines are far from the direction that they are to follow."""
+    angle = float(np.degrees(np.arccos(min(lines.aligned, 1.0))))
+    if request.along is None or angle <= _OFF:
+        return ()
+    return (f"strips run at {angle:.0f} degrees to the given direction: no lines are nearer to it",)
 
 
 def case_of(design: Mesh, request: StripsRequest) -> Case:
