@@ -88,10 +88,10 @@ def around(mesh: Mesh) -> Around | None:
 
 
 def inside(mesh: Mesh, loop: Ints, at: Array) -> Array:
-    """Return an image (n, 2) of triangles harmonic but for small weights, with given boundary.
+    """Return a harmonic image (n, 2) of a mesh of triangles, with given boundary.
 
-    No triangle is inverted where the boundary loop is mapped to a convex curve, as all weights are
-    positive (Tutte 1963, Floater 1997).
+    Where triangles would be inverted, small and negative weights are raised: with positive ones
+    none is inverted if the boundary loop is mapped to a convex curve (Tutte 1963, Floater 1997).
 
     Examples
     --------
@@ -101,15 +101,20 @@ def inside(mesh: Mesh, loop: Ints, at: Array) -> Array:
     array([0.8, 1. ])
     """
     a, b = (np.roll(mesh.triangles, -k, axis=1).ravel() for k in (1, 2))
-    weight, none = _weights(mesh), np.zeros(len(mesh.vertices))
-    return np.stack([_harmonic(a, b, weight, loop, x, none) for x in at.T], axis=1)
+    none = np.zeros(len(mesh.vertices))
+    for least in (-np.inf, _LEAST):
+        weight = _weights(mesh, least)
+        image = np.stack([_harmonic(a, b, weight, loop, x, none) for x in at.T], axis=1)
+        if (geometry.signed_areas(image, mesh.triangles) > 0).all():
+            break
+    return image
 
 
-def _weights(mesh: Mesh) -> Array:
-    """Return the cotangents at the corners of triangles (3 t,), small and negative ones raised."""
+def _weights(mesh: Mesh, least: float = _LEAST) -> Array:
+    """Return the cotangents at the corners of triangles (3 t,), at least a number."""
     angles = geometry.corner_angles(mesh.vertices, mesh.triangles)
     cotangent = 0.5 / np.tan(np.clip(angles, 1e-6, np.pi - 1e-6))
-    return np.maximum(cotangent, _LEAST).ravel()
+    return np.maximum(cotangent, least).ravel()
 
 
 def _right(mesh: Mesh, vertex: Ints, low: Ints) -> Flags | None:

@@ -26,9 +26,9 @@ _FEW = 12
 _FINE, _WIDE = 128, 40
 #: Distance of corners along the outline, relative to its length, below which they are one.
 _SAME = 1e-3
-#: Shortest side of a grid, relative to the length of the outline; difference of turning angles, in
-#: radians, of corners that are equally sharp.
-_SHORT, _ALIKE = 0.05, 1e-3
+#: Shortest side of a grid, relative to the length of the outline; turning angles are compared in
+#: steps, in radians.
+_SHORT, _ALIKE = 0.05, 0.02
 #: Turning of the outline at a corner, in radians.
 _SHARP = np.radians(30.0)
 #: Points around the outline, and how many of them its places are averaged over to smooth it.
@@ -66,11 +66,10 @@ def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
     turn = turning(outline)
     found: list[Ints] = []
     if along is None:
-        order = np.argsort(-turn, kind="stable")
-        sharpest = np.sort(order[:4])
-        # Of more corners that are as sharp, four would be chosen by their numbers.
-        alone = len(turn) == 4 or turn[order[3]] > turn[order[4]] + _ALIKE
-        if turn[sharpest].min() > _SHARP and alone and _apart(flat[loop], sharpest):
+        # Of corners that are equally sharp, the farthest from the middle are taken.
+        far = lengths(outline - outline.mean(axis=0))
+        sharpest = np.sort(np.lexsort((-far, -np.round(turn / _ALIKE)))[:4])
+        if turn[sharpest].min() > _SHARP and _apart(outline, sharpest):
             found.append(sharpest)
     angle = _principal(mesh, flat) if along is None else _direction(mesh, flat, along)
     corners = _touching(outline, turn, angle)
