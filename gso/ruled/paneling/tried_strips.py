@@ -31,9 +31,14 @@ class Tried:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
 
-    def order(self, *, few: bool) -> tuple[bool, int, float]:
-        """Sort key: what was asked for first, fewer strips before more if asked, then distances."""
-        return not self.holds, self.strips if few and self.holds else 0, self.far
+    def order(self, *, few: bool) -> tuple[bool, bool, int, float]:
+        """Sort key: what was asked for first, then what is neither folded nor crosses itself.
+
+        Fewer strips before more if asked, then distances.
+        """
+        surface, count = self.result.ruled, self.strips if few and self.holds else 0
+        broken = not self.holds and (surface is None or not surface.sound)
+        return not self.holds, broken, count, self.far
 
     @property
     def strips(self) -> int:
