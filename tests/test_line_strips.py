@@ -7,7 +7,6 @@ import pytest
 
 import gso
 from gso.mesh import Mesh
-from gso.mesh.cut import cut
 from gso.ruled.lines import LineStrips, families
 
 
@@ -376,7 +375,7 @@ def test_outlines_that_have_no_corners_or_many():
 def test_metrics_of_parts_with_slits():
     tube = gso.as_mesh(sheet("cylinder", count=13))
     row = tube.grid_index[6, :5]
-    slit = cut(tube, np.stack([row[:-1], row[1:]], axis=1)).mesh
+    slit = gso.cut(tube, np.stack([row[:-1], row[1:]], axis=1)).opened.mesh
     found = gso.strips(slit, max_deviation=0.01).metrics
     assert 0 < found["part_circle_min"] < 2.0 and found["part_area_min"] <= 100.0
 
