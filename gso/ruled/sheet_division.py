@@ -169,10 +169,9 @@ class _Strips:
         whole = float(at[-1]) + ends[1]
         for count in range(2, 2 * len(path) + 1):
             wanted = (whole * np.arange(1, count) / count).tolist()
-            along = [self._joint(hinges, path, at, place) for place in wanted]
-            across = [self._across(hinges, path, at, place) for place in wanted]
-            for found in (along, across):
-                joints = [joint for joint in dict.fromkeys(found) if joint is not None]
+            for way in (self._joint, self._across):
+                found = dict.fromkeys(way(hinges, path, at, place) for place in wanted)
+                joints = [joint for joint in found if joint is not None]
                 if joints and all(fits(part) for part in self._parts(path, joints)):
                     return joints
         return []
@@ -372,13 +371,14 @@ class _Nodes:
             self.points.append((1.0 - share) * self.vertices[a] + share * self.vertices[b])
         return known[share]
 
+    def _between(self, a: int, b: int) -> list[int]:
+        """Return the new vertices on an edge, from one end to the other."""
+        new = self._new.get((min(a, b), max(a, b)), {})
+        return [number for _, number in sorted(new.items(), reverse=a > b)]
+
     def pieces(self, edges: Ints) -> Ints:
         """Return edges (k, 2) divided at their new vertices."""
-        out = []
-        for a, b in edges.tolist():
-            between = sorted(self._new.get((min(a, b), max(a, b)), {}).items(), reverse=a > b)
-            chain = [a, *(number for _, number in between), b]
-            out += list(pairwise(chain))
+        out = [pair for a, b in edges.tolist() for pair in pairwise([a, *self._between(a, b), b])]
         return np.array(out, np.int64).reshape(-1, 2)
 
     def insert(self) -> None:
@@ -386,9 +386,7 @@ class _Nodes:
         for ring in self.rings.values():
             out: list[int] = []
             for a, b in zip(ring, ring[1:] + ring[:1], strict=True):
-                out.append(a)
-                new = sorted(self._new.get((min(a, b), max(a, b)), {}).items(), reverse=a > b)
-                out += [number for _, number in new]
+                out += [a, *self._between(a, b)]
             ring[:] = out
 
 
