@@ -24,6 +24,7 @@ from gso.geometry.cells import (
     isometry_defect,
 )
 from gso.geometry.closing import Closing, closing
+from gso.geometry.depth_buffer import in_front, nearest_triangles
 from gso.geometry.differences import second_difference
 from gso.geometry.gauss_image import image_curvature, solid_angle
 from gso.geometry.parametric import smooth_gaussian_curvature
@@ -78,7 +79,9 @@ __all__ = [
     "grid_star",
     "half_trace",
     "image_curvature",
+    "in_front",
     "isometry_defect",
+    "nearest_triangles",
     "norm",
     "norm2",
     "principal_stretches",

@@ -18,7 +18,7 @@ from gso.errors import GSOError
 from gso.io import check_writable, replacing, suffix_of
 from gso.mesh import topology
 from gso.plot.heat import Heat, Scale
-from gso.typing import AnyPath, Array, Ints
+from gso.typing import AnyPath, Array, Ints, Keywords
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,6 +46,10 @@ _EDGE, _STROKE = 0.35, 0.9
 
 #: Width of a panel, height of the colour bars, and height of the titles, inches.
 _WIDTH, _BAR, _TITLE = 4.0, 0.85, 0.35
+
+#: How names are drawn.
+_LABEL = {"boxstyle": "round,pad=0.15", "facecolor": "white", "linewidth": 0, "alpha": 0.8}
+_NAME: Keywords = {"fontsize": 8, "weight": "bold", "ha": "center", "va": "center", "bbox": _LABEL}
 
 #: Largest number of faces for which mesh lines are visible.
 _LINES = 2500
@@ -75,6 +79,8 @@ class Panel:
         Polylines on the surface, in the same coordinates.
     circle : float
         Radius of a circle about the origin, behind the faces; 0 for none.
+    names : sequence of (str, ndarray (3,))
+        Texts, and the points that they stand at.
     """
 
     points: Array
@@ -86,6 +92,7 @@ class Panel:
     shaded: bool = True
     lines: Sequence[Array] = ()
     circle: float = 0.0
+    names: Sequence[tuple[str, Array]] = ()
 
     @property
     def corners(self) -> Ints:
@@ -183,6 +190,8 @@ def _paint(ax: Axes, panel: Panel, span: Array) -> ScalarMappable | None:
         ax.add_patch(Circle((0.0, 0.0), panel.circle, facecolor="none", edgecolor=_RIM))
     colours, mappable = _colours(panel)
     ax.add_collection(_polygons(panel, colours))
+    for name, at in panel.names:
+        ax.text(float(at[0]), float(at[1]), name, **_NAME)
     seen = _seen(panel)
     middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
     ax.set_xlim(middle[0] - span[0] / 2, middle[0] + span[0] / 2)

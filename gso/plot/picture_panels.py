@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import colorsys
-
 import numpy as np
 
+from gso.components import split
 from gso.mesh import Mesh
+from gso.mesh.view import View, pale_colours
+from gso.pattern import Pattern
 from gso.plot.draw import GRAZING, Panel, facing, turned
-from gso.plot.view import View
 from gso.ruled.ruled_surface import RuledSurface
 from gso.rulings import gauss_image, shape_operator, trace
 from gso.seams.segmentation import Segmentation, whole_pattern
-from gso.typing import Array
+from gso.typing import Array, Ints
 
 #: Colours of neighbouring strips, and of flat regions.
 _STRIPS = np.array([(0.60, 0.71, 0.82), (0.78, 0.83, 0.72)])
@@ -53,6 +53,8 @@ def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
     after.title = f"{parts} strip{'s' if parts > 1 else ''}, largest distance {share:.2g} %"
     edges = np.concatenate([surface.rulings.edges, surface.creases.edges])
     after.lines = list(after.points[edges])
+    number = part_numbers(surface.pattern)
+    after.names = _named(after, number)
     flat = surface.pattern.flat
     seen = after.points[surface.pattern.vertex]
     turn = facing(flat, seen) if parts == 1 else 1.0
@@ -60,21 +62,45 @@ def strips(design: Mesh, surface: RuledSurface) -> list[Panel]:
     points = turned(flat - middle, turn) / size
     sheet = Panel(points, surface.pattern.faces, shaded=False, tint=tint)
     sheet.title = "exact pattern with its bend lines"
+    sheet.names = _named(sheet, number)
     sheet.lines = [turned(bend.line - middle, turn) / size for bend in surface.bends]
     return [before, after, sheet]
+
+
+def part_numbers(pattern: Pattern) -> Ints:
+    """Return the number of the part that each face of a pattern is in: from 1, the largest first.
+
+    These are the numbers of parts in the files of ``gso fabricate``.
+    """
+    out = np.empty(len(pattern.faces), np.int64)
+    for number, part in enumerate(sorted(split(pattern.mesh), key=lambda part: -part.area)):
+        out[part.faces] = number + 1
+    return out
+
+
+def _named(panel: Panel, number: Ints) -> list[tuple[str, Array]]:
+    """Return the numbers of parts, each at the centroid of a face in its middle."""
+    middle = panel.points[panel.corners].mean(axis=1)
+    out = []
+    for k in np.unique(number).tolist():
+        own = middle[number == k]
+        out.append((str(k), own[int(((own - own.mean(axis=0)) ** 2).sum(axis=1).argmin())]))
+    return out
 
 
 def pieces(found: Segmentation) -> list[Panel]:
     """Make panels of the surface with its seams, of its other side, and of the patterns."""
     view = View.of(found.design)
-    behind = View(view.frame, view.axes * np.array([-1.0, 1.0, -1.0]))
-    colours = _colours(len(found))
+    colours = pale_colours(len(found))
     surface = found.design
     panels = []
-    for side, title in ((view, _title(found)), (behind, "from behind")):
+    for side, title in ((view, _title(found)), (view.behind, "from behind")):
         panel = Panel(side.project(surface.vertices), surface.faces, title, light=GRAZING)
         panel.tint = colours[found.of_face]
         panel.lines = list(panel.points[found.edges])
+        if side is view:
+            names = _named(panel, found.of_face)
+            panel.names = [(found.name(int(k)), at) for k, at in names]
         panels.append(panel)
     own = [k for k, sheet in enumerate(found.sheets) if sheet is not None]
     if own:
@@ -92,9 +118,3 @@ def pieces(found: Segmentation) -> list[Panel]:
 def _title(found: Segmentation) -> str:
     count = len(found)
     return f"{count} piece{'s' if count > 1 else ''}, seam {found.seam_length:.3g}"
-
-
-def _colours(count: int) -> Array:
-    """Return pale colours of even brightness, far apart for neighbouring numbers."""
-    hue = (0.58 + 0.618034 * np.arange(count)) % 1.0
-    return np.array([colorsys.hls_to_rgb(h, 0.74, 0.45) for h in hue]).reshape(-1, 3)

@@ -7,17 +7,19 @@ millimetres (:func:`fitted`) and become parts (:func:`parts_from`), and parts ar
 """
 
 from gso.pattern import Bend
+from gso.workshop.assembly_view import assembly
 from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
 from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
-from gso.workshop.part import Drawing, Label, Notch, Part
+from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
-from gso.workshop.pattern_panels import of_net
+from gso.workshop.pattern_panels import of_net, of_surface
 from gso.workshop.tabs import TabSeam, with_tabs, without_tabs
 from gso.workshop.thickness import Thickness, thickened
+from gso.workshop.traced_guides import guide_lines
 
 __all__ = [
     "Bend",
@@ -25,17 +27,21 @@ __all__ = [
     "Drawing",
     "FabricationSettings",
     "Finish",
+    "GuideLine",
     "Label",
     "Notch",
     "Panel",
     "Part",
     "TabSeam",
     "Thickness",
+    "assembly",
     "designs_of",
     "fitted",
+    "guide_lines",
     "made",
     "nest",
     "of_net",
+    "of_surface",
     "parts_from",
     "thickened",
     "with_tabs",

@@ -27,6 +27,8 @@ _LENGTHS = (
     "seam_gap",
     "thickness",
 )
+#: Square millimetres of a square metre.
+_SQUARE_METRE = 1e6
 _PACKAGES = ("gso", "numpy", "scipy", "shapely", "ezdxf", "spyrrow")
 
 
@@ -85,6 +87,8 @@ def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) 
         "seam_mismatch_at": made.matings[worst].number if mismatch else None,
         "parts": [part_record(panel, part) for panel, part in zip(panels, parts, strict=True)],
     }
+    if own.get("area", 0.0) > 0.0:
+        own["parts_per_m2"] = len(parts) / (own["area"] / _SQUARE_METRE)
     record: Json = plain(own)
     return record
 
@@ -103,6 +107,8 @@ def part_record(panel: Panel, part: Part) -> Json:
         "bends": len(part.bends),
         "bend_angle_max": float(angles.max(initial=0.0)),
         "bend_radius_min": float(panel.radii.min(initial=np.inf)),
+        "guide_lines": len(part.guides),
+        "guide_angle_max": float(np.degrees(max((g.angle for g in part.guides), default=0.0))),
         "zones": [
             {
                 "kind": zone.kind,

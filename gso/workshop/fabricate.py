@@ -409,12 +409,14 @@ def _named(found: dict[int, Made]) -> dict[int, Made]:
 
 
 def _notes(records: Sequence[Json], settings: FabricationSettings) -> list[str]:
-    """Say what is not as a reader might expect, although it is within what was asked."""
+    """Return notes on parts without bend lines."""
     every = [part for record in records for part in record.get("parts", ())]
-    bare = sum(part["bends"] == 0 for part in every)
-    if settings.formulation != "ruled" or not bare:
+    guided = [part["guide_angle_max"] for part in every if part["guide_lines"]]
+    if not guided:
         return []
+    no_strip = "no strip follows them closely enough" if settings.formulation == "ruled" else ""
     return [
-        f"{bare} of {len(every)} parts have no bend lines: they are flat, or no strip follows them "
-        "closely enough, and they are nearly developable"
+        f"{len(guided)} of {len(every)} parts are curved and have no bend lines"
+        f"{': ' if no_strip else ''}{no_strip}; their guide lines, along which they are curved "
+        f"least, are up to {max(guided):.2g} degrees from straight"
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,7 +69,7 @@ def written(
     place: Path,
     parts: Sequence[Part],
     sheets: Sequence[Drawing],
-    found: Iterable[Made],
+    found: Collection[Made],
     certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
@@ -100,7 +100,7 @@ def written(
     if solids:
         io.save_solids(solids, place / SOLIDS)
         files.append(SOLIDS)
-    write_bytes(place / PAGE, page(certificate, parts, sheets).encode())
+    write_bytes(place / PAGE, page(certificate, parts, sheets, found).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,6 +61,30 @@ class Notch:
     text: str
 
 
+class GuideLine(NamedTuple):
+    """A line along which a curved part without bend lines is bent least.
+
+    Attributes
+    ----------
+    line : ndarray, (k, 2)
+        Its points.
+    angle : float
+        Angle in radians by which it is not straight: that between a circular arc of the same
+        length and height and its chord, at the ends.
+    """
+
+    line: Array
+    angle: float
+
+    def in_words(self) -> str:
+        """Say what it is.
+
+        >>> GuideLine(np.zeros((2, 2)), np.radians(3.2)).in_words()
+        'guide line, 3.2 degrees from straight'
+        """
+        return f"guide line, {np.degrees(self.angle):.2g} degrees from straight"
+
+
 @dataclass(frozen=True, eq=False)
 class Part:
     """A flat part.
@@ -75,6 +100,8 @@ class Part:
         Straight lines to bend along: angles in radians, positive for mountain folds.
     zones : tuple of Zone
         Round faces that are bent as a whole, by the numbers that bends have.
+    guides : tuple of GuideLine
+        Lines along which it is bent least, if it is curved and has no bends.
     creases : tuple of ndarray, (k, 2)
         Lines to fold along that are not bends of the sheet, such as those of tabs.
     marks : tuple of ndarray, (k, 2)
@@ -105,6 +132,7 @@ class Part:
     count: int = 1
     zones: tuple[Zone, ...] = ()
     faces: tuple[str, ...] = ()
+    guides: tuple[GuideLine, ...] = ()
 
     @cached_property
     def area(self) -> float:
@@ -165,6 +193,7 @@ class Part:
             outline=outline,
             holes=each(self.holes),
             bends=tuple(b._replace(line=b.line @ turn + shift) for b in self.bends),
+            guides=tuple(g._replace(line=g.line @ turn + shift) for g in self.guides),
             creases=each(self.creases),
             marks=each(self.marks),
             seams=each(self.seams),

@@ -21,6 +21,7 @@ from gso.workshop.polygons import moved, region, roomiest
 from gso.workshop.seam_strips import with_strips
 from gso.workshop.tabs import TabSeam, with_tabs
 from gso.workshop.thickness import thickened
+from gso.workshop.traced_guides import guide_lines
 
 #: Angle, in radians, from which on a bend is drawn; smaller ones are added to the next.
 _DRAWN = np.radians(0.2)
@@ -167,6 +168,7 @@ def _bare(panel: Panel, marks: Sequence[Array], cut: Sequence[Array]) -> Part:
         marks=tuple(marks),
         zones=panel.zones,
         faces=panel.faces,
+        guides=guide_lines(panel),
     )
 
 

@@ -2,8 +2,8 @@
 
 The outline is divided into four sides, and the disk is mapped harmonically to a rectangle, so that
 grid lines join opposite sides. Sides begin at the sharpest corners of the outline, or where a
-box along the principal directions of curvature, or along a given direction, touches it. Surfaces
-with two boundary loops are mapped to a cylinder.
+box along the principal directions of curvature, a mirror plane or a given direction touches it.
+Surfaces with two boundary loops are mapped to a cylinder.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from gso.geometry.polygon import arc_lengths, signed_area
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.mesh.polyline import turns
+from gso.ruled.lines.mirror_lines import mirror_lines
 from gso.ruled.polygon import turning
 from gso.typing import Array, Ints
 
@@ -31,6 +32,8 @@ _SAME = 1e-3
 _SHORT, _ALIKE = 0.05, 0.02
 #: Turning of the outline at a corner, in radians.
 _SHARP = np.radians(30.0)
+#: Least angle between boxes, in radians, and largest number of those along mirror planes.
+_TURNED, _MIRRORS = np.radians(5.0), 2
 #: Points around the outline, and how many of them its places are averaged over to smooth it.
 _AROUND, _WINDOW = 256, 33
 
@@ -71,11 +74,26 @@ def grid_copies(mesh: Mesh, along: Array | None = None) -> list[Mesh]:
         sharpest = np.sort(np.lexsort((-far, -np.round(turn / _ALIKE)))[:4])
         if turn[sharpest].min() > _SHARP and _apart(outline, sharpest):
             found.append(sharpest)
-    angle = _principal(mesh, flat) if along is None else _direction(mesh, flat, along)
-    corners = _touching(outline, turn, angle)
-    if corners is not None and not any(np.array_equal(np.sort(corners), own) for own in found):
-        found.append(corners)
+    for angle in _angles(mesh, flat) if along is None else [_direction(mesh, flat, along)]:
+        corners = _touching(outline, turn, angle)
+        if corners is not None and not any(np.array_equal(np.sort(corners), own) for own in found):
+            found.append(corners)
     return [_grid(mesh, loop, turn, corners) for corners in found]
+
+
+def _angles(mesh: Mesh, flat: Array) -> list[float]:
+    """Return angles in the plane of lines that strips may run along or across.
+
+    These are a principal direction of curvature and, where they differ, mirror planes.
+    """
+    out = [_principal(mesh, flat)]
+    for line in mirror_lines(mesh):
+        angle = _direction(mesh, flat, np.tile(line, (len(mesh.triangles), 1)))
+        # A box at right angles is the same.
+        off = [abs((angle - own + 0.25 * np.pi) % (0.5 * np.pi) - 0.25 * np.pi) for own in out]
+        if min(off) > _TURNED and len(out) <= _MIRRORS:
+            out.append(angle)
+    return out
 
 
 def _slopes(mesh: Mesh, flat: Array, values: Array) -> Array:

@@ -45,6 +45,7 @@ _SEW = Layer("SEW", "#ff8000", 30, dash=(2.0, 1.0))
 _UP = Layer("BEND_UP", "#0000ff", 5, dash=(4.0, 1.5))
 _DOWN = Layer("BEND_DOWN", "#00a000", 3, dash=(6.0, 1.5, 0.5, 1.5))
 _ROLL = Layer("ROLL", "#00a0a0", 132, dash=(1.5, 1.5))
+_GUIDE = Layer("GUIDE", "#808000", 56, dash=(1.0, 2.0))
 _CUT = Layer("CUT", "#ff0000", 1)
 
 SETS: dict[str, dict[str, Layer]] = {
@@ -56,6 +57,7 @@ SETS: dict[str, dict[str, Layer]] = {
         "notch": _ENGRAVE,
         "grain": _GRAIN,
         "arrow": _GRAIN,
+        "guide": _GUIDE,
         "roll": _ROLL,
         "valley": _UP,
         "mountain": _DOWN,
@@ -68,6 +70,7 @@ SETS: dict[str, dict[str, Layer]] = {
         "text": _LABEL._replace(name="15"),
         "mark": _ENGRAVE._replace(name="8"),
         "crease": _ENGRAVE._replace(name="8"),
+        "guide": _ENGRAVE._replace(name="8"),
         "roll": _ENGRAVE._replace(name="8"),
         "valley": _ENGRAVE._replace(name="8"),
         "mountain": _ENGRAVE._replace(name="8"),

@@ -11,7 +11,7 @@ import numpy as np
 from gso.pattern import Bend, Zone
 from gso.typing import Array
 from gso.workshop.names import different
-from gso.workshop.part import Drawing, Label, Part
+from gso.workshop.part import Drawing, GuideLine, Label, Part
 from gso.workshop.polygons import common, region
 
 # A bend by less is none, in radians.
@@ -38,8 +38,8 @@ class Line:
     ----------
     kind : str
         ``outline``, ``hole``, ``mountain``, ``valley``, ``roll`` (a line of what is rolled),
-        ``crease``, ``mark``, ``seam``, ``notch``, ``grain``, ``arrow`` (the head of the grain line)
-        or ``sheet``.
+        ``guide``, ``crease``, ``mark``, ``seam``, ``notch``, ``grain``, ``arrow`` (the head of the
+        grain line) or ``sheet``.
     points : ndarray, (k, 2)
         In millimetres. The first point of a closed line is not repeated.
     closed : bool
@@ -47,6 +47,8 @@ class Line:
         The bend along it.
     zone : Zone, optional
         The zone that the bend is a line of.
+    guide : GuideLine, optional
+        The guide line that it is.
     """
 
     kind: str
@@ -54,10 +56,13 @@ class Line:
     closed: bool = False
     bend: Bend | None = None
     zone: Zone | None = None
+    guide: GuideLine | None = None
 
     @property
     def title(self) -> str:
-        """What is done along it, in words; empty if it is no bend."""
+        """What is done along it, in words; empty if it is no bend and no guide line."""
+        if self.guide is not None:
+            return self.guide.in_words()
         if self.bend is None:
             return ""
         zone = "" if self.zone is None else f"{self.zone.in_words()}; here "
@@ -88,6 +93,7 @@ def lines(part: Part) -> list[Line]:
         Line(_kind(part, bend), np.asarray(bend.line), bend=bend, zone=_zone(part, bend))
         for bend in _bends(part)
     ]
+    drawn += [Line("guide", guide.line, guide=guide) for guide in part.guides]
     drawn += [_line("seam", line) for line in part.seams]
     drawn += [_line("hole", line, closed=True) for line in part.holes]
     return [*drawn, _line("outline", part.outline, closed=True)]

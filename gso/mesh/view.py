@@ -1,13 +1,14 @@
-"""The view from which a surface is drawn."""
+"""Views of surfaces for pictures: projection, and colours of parts."""
 
 from __future__ import annotations
 
+import colorsys
 from dataclasses import dataclass
 
 import numpy as np
 
 from gso import geometry
-from gso.mesh import Frame, Mesh
+from gso.mesh.mesh import Frame, Mesh
 from gso.typing import Array
 
 #: Angles about the vertical axis and above the horizon, degrees.
@@ -49,6 +50,11 @@ class View:
         toward /= np.linalg.norm(toward)
         return cls(mesh.frame, _tilted(up, toward, np.arcsin(normal[2]) + np.radians(20.0)))
 
+    @property
+    def behind(self) -> View:
+        """The view of the other side."""
+        return View(self.frame, self.axes * np.array([-1.0, 1.0, -1.0]))
+
     def project(self, points: Array) -> Array:
         """Project points (n, 3) to right, up and towards the viewer, in units of the frame."""
         return self.frame.to_unit(points) @ self.axes
@@ -71,3 +77,9 @@ def _tilted(up: Array, toward: Array, tilt: float) -> Array:
     right = np.cross(up, eye)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(eye, right), eye], axis=1)
+
+
+def pale_colours(count: int) -> Array:
+    """Return colours (n, 3) of even brightness, 0 to 1, far apart for neighbouring numbers."""
+    hue = (0.58 + 0.618034 * np.arange(count)) % 1.0
+    return np.array([colorsys.hls_to_rgb(h, 0.74, 0.45) for h in hue]).reshape(-1, 3)

@@ -1,0 +1,93 @@
+"""What is seen of triangles in an orthographic picture: a depth buffer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.typing import Array, Flags, Ints
+
+
+def nearest_triangles(corners: Array, shape: tuple[int, int]) -> tuple[Ints, Array]:
+    """Find the triangle that is nearest to the viewer in each pixel.
+
+    Parameters
+    ----------
+    corners : ndarray, (m, 3, 3)
+        Corners of triangles: column and row of the picture, in pixels, and depth, which grows
+        towards the viewer. The centre of the pixel in row i and column j is (j + 0.5, i + 0.5).
+    shape : (int, int)
+        Number of rows and columns.
+
+    Returns
+    -------
+    triangle : ndarray of int, (rows, columns)
+        -1 where there is none.
+    depth : ndarray, (rows, columns)
+        Minus infinity where there is none.
+
+    Examples
+    --------
+    >>> near = np.array([[0.0, 0, 2], [2, 0, 2], [0, 2, 2]])
+    >>> far = np.array([[0.0, 0, 1], [4, 0, 1], [0, 4, 1]])
+    >>> nearest_triangles(np.stack([far, near]), (2, 3))[0].tolist()
+    [[1, 1, 0], [1, 0, 0]]
+    """
+    rows, columns = shape
+    owner, row, left, right, start, slope = _spans(corners, rows)
+    first = np.clip(np.ceil(left - 0.5), 0, columns).astype(np.int64)
+    count = np.clip(np.floor(right - 0.5).astype(np.int64) + 1, first, columns) - first
+    span = np.repeat(np.arange(len(owner)), count)
+    column = np.arange(len(span)) - np.repeat(np.cumsum(count) - count - first, count)
+    depth = start[span] + slope[span] * (column + 0.5 - left[span])
+    pixel = row[span] * columns + column
+    order = np.lexsort((depth, pixel))
+    last = np.ones(len(order), bool)
+    last[:-1] = pixel[order[1:]] != pixel[order[:-1]]
+    top = order[last]
+    triangle = np.full(rows * columns, -1)
+    deep = np.full(rows * columns, -np.inf)
+    triangle[pixel[top]], deep[pixel[top]] = owner[span[top]], depth[top]
+    return triangle.reshape(shape), deep.reshape(shape)
+
+
+def _spans(corners: Array, rows: int) -> tuple[Ints, Ints, Array, Array, Array, Array]:
+    """Return the parts of rows that triangles cover.
+
+    These are, for each: its triangle and row, its left and right end, the depth at its left end,
+    and how that grows with the column.
+    """
+    low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
+    first = np.clip(np.ceil(low - 0.5), 0, rows).astype(np.int64)
+    count = np.clip(np.floor(high - 0.5).astype(np.int64) + 1, first, rows) - first
+    owner = np.repeat(np.arange(len(corners)), count)
+    row = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count - first, count)
+    left, right = np.full(len(owner), np.inf), np.full(len(owner), -np.inf)
+    start, end = np.zeros(len(owner)), np.zeros(len(owner))
+    for k in range(3):
+        a, b = corners[owner, k], corners[owner, (k + 1) % 3]
+        rise = b[:, 1] - a[:, 1]
+        share = (row + 0.5 - a[:, 1]) / np.where(rise == 0.0, 1.0, rise)
+        crossed = (rise != 0.0) & (share >= 0.0) & (share <= 1.0)
+        x, z = (a[:, i] + share * (b[:, i] - a[:, i]) for i in (0, 2))
+        for side, at, is_more in ((left, start, x < left), (right, end, x > right)):
+            taken = crossed & is_more
+            side[taken], at[taken] = x[taken], z[taken]
+    slope = (end - start) / np.where(right > left, right - left, 1.0)
+    known = np.flatnonzero(right >= left)
+    return owner[known], row[known], left[known], right[known], start[known], slope[known]
+
+
+def in_front(points: Array, depth: Array, near: float) -> Flags:
+    """Tell which points (n, 3) are in front of what a depth buffer has, or at most `near` behind.
+
+    Points are compared with the farthest of the pixels around them, so that those on outlines
+    are seen.
+    """
+    rows, columns = depth.shape
+    farthest = np.full(len(points), np.inf)
+    for i in (-1, 0, 1):
+        for j in (-1, 0, 1):
+            column = np.clip(points[:, 0].astype(np.int64) + j, 0, columns - 1)
+            row = np.clip(points[:, 1].astype(np.int64) + i, 0, rows - 1)
+            np.minimum(farthest, depth[row, column], out=farthest)
+    return np.asarray(points[:, 2] >= farthest - near)
