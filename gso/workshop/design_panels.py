@@ -14,6 +14,7 @@ from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
 from gso.recognition import Recognised
+from gso.result import StripsResult
 from gso.verdict import compare, crosses_itself
 from gso.verdict.surface_checks import crossed
 from gso.workshop import measurements
@@ -221,6 +222,9 @@ def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int
     record = measurements.of_pattern(given.mesh, result.mesh, result.pattern, settings, allowed)
     numbers = np.atleast_1d(result.details["strips"]).tolist()
     record |= {"pieces": len(numbers), "strips": numbers}
+    # Not those of parts that are developable as they are: their folds and bends are meant.
+    if isinstance(result, StripsResult) and result.ruled.strain is None:
+        record["crease_angle_max"] = float(np.degrees(result.ruled.creases.largest_angle))
     if "seam_gap" in result.details:
         record["seam_gap"] = result.details["seam_gap"]
     far = result.distances

@@ -41,6 +41,7 @@ from gso.workshop.nesting import Rotations, checked_options, nest
 from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
+from gso.workshop.part_notes import guide_notes, outline_notes, strip_notes
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.seam_strips import no_such_seam
 from gso.workshop.solids import folded_solids
@@ -295,7 +296,8 @@ def fabricate(
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
-        said = without_tabs(bare) if asked.tabs else []
+        said = [*strip_notes(fit.panels, record), *outline_notes(record)]
+        said += without_tabs(bare) if asked.tabs else []
         is_kept = one.record["deviation_max"] == 0.0
         if is_kept and settings.formulation == "ruled" and one.record["strain_max"] > EXACT:
             said.append(as_it_is(one.record["strain_max"]))
@@ -334,7 +336,7 @@ def fabricate(
         "sheets": [],
         "notes": [
             *dict.fromkeys(notes),
-            *_notes(records, settings),
+            *guide_notes(records, settings),
         ],
     }
     sheets: list[Drawing] = []
@@ -406,17 +408,3 @@ def _named(found: dict[int, Made]) -> dict[int, Made]:
     in_order = dict(sorted(found.items()))
     names = iter(different(panel.name for one in in_order.values() for panel in one.panels))
     return {k: one.named([next(names) for _ in one.panels]) for k, one in in_order.items()}
-
-
-def _notes(records: Sequence[Json], settings: FabricationSettings) -> list[str]:
-    """Return notes on parts without bend lines."""
-    every = [part for record in records for part in record.get("parts", ())]
-    guided = [part["guide_angle_max"] for part in every if part["guide_lines"]]
-    if not guided:
-        return []
-    no_strip = "no strip follows them closely enough" if settings.formulation == "ruled" else ""
-    return [
-        f"{len(guided)} of {len(every)} parts are curved and have no bend lines"
-        f"{': ' if no_strip else ''}{no_strip}; their guide lines, along which they are curved "
-        f"least, are up to {max(guided):.2g} degrees from straight"
-    ]

@@ -30,9 +30,9 @@ _BACK, _OUTLINE = 0.5, 0.3
 #: Factor on tangential displacements.
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
-_PHASES = tuple((float(1.6**k), float(0.6**k)) for k in range(0, 21, 2))
+_PHASES = tuple((float(1.6**k), float(0.6**k)) for k in range(0, 21, 4))
 #: Least weight of these second differences.
-_FAIR = 0.03
+_FAIR = 0.4
 #: Weight of the places of the outline's corners, and the turning of the outline there, in degrees.
 _CORNERS, _SHARP = 3.0, 30.0
 #: Weight of coplanarity when it becomes exact, rounds of that, updates of multipliers in each, and

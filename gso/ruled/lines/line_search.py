@@ -36,7 +36,7 @@ _GOOD = 0.5
 _PLANAR = 0.2
 #: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
 #: half of them for the second family.
-_SETTINGS = ((False, 0.03), (True, 0.03), (False, 0.5), (True, 0.5))
+_SETTINGS = ((False, 0.4), (True, 0.4), (False, 0.05), (True, 0.05))
 #: Ratio to the distance that is predicted for half as many strips from which others are tried.
 _WORSE = 3.0
 #: Distance of samples from one another's surfaces at which strips are the mesh.

@@ -6,6 +6,7 @@ import numpy as np
 
 from gso.result import Result, StripsResult
 from gso.ruled.strip_metrics import part_metrics
+from gso.typing import Array
 from gso.wording import length
 
 #: Angle of a fold and of a crease, in degrees, that a note is made of.
@@ -21,28 +22,49 @@ def shop_notes(result: Result) -> tuple[str, ...]:
     """
     if not isinstance(result, StripsResult) or result.ruled.strain is not None:
         return ()
-    rulings, creases, size = result.ruled.rulings, result.ruled.creases, result.design.size
+    rulings, steep = result.ruled.rulings, float(np.degrees(result.ruled.creases.largest_angle))
+    small = part_metrics(result.ruled.pattern)["part_area_min"]
+    return said(rulings.angles, rulings.radii, result.design.size, steep, small)
+
+
+def said(
+    angles: Array, radii: Array, size: float, steep: float, small: float, unit: str = ""
+) -> tuple[str, ...]:
+    """Say what is sharp, tight, steep or small.
+
+    Parameters
+    ----------
+    angles, radii : ndarray, (b,)
+        Angles of bends in radians, and their radii.
+    size : float
+        The design's size, in the unit of the radii.
+    steep : float
+        Largest angle between strips, in degrees.
+    small : float
+        Area of the smallest part, in % of all.
+    unit : str
+        Name of the unit of length; empty for that of the design.
+    """
     notes = []
-    sharp = np.degrees(np.abs(rulings.angles))
+    sharp = np.degrees(np.abs(angles))
     if (folded := int((sharp > _SHARP).sum())) > 0:
         where = "one ruling" if folded == 1 else f"{folded} rulings, each on its own"
         notes.append(
             f"the surface folds by up to {sharp.max():.0f} degrees at {where}; more strips, or "
             "min_radius, bend it more gently"
         )
-    tight = int((rulings.radii < _TIGHT * size).sum())
+    tight = int((radii < _TIGHT * size).sum())
     if tight:
         bends = "one bend is" if tight == 1 else f"{tight} bends are"
+        least = f"{length(float(radii.min()))} {unit}".strip()
         notes.append(
             f"{bends} tighter than {100 * _TIGHT:g} % of the design's size, with radii from "
-            f"{length(rulings.smallest_radius)}; give min_radius if that cannot be bent"
+            f"{least}; give min_radius if that cannot be bent"
         )
-    steep = np.degrees(creases.largest_angle)
     if steep > _STEEP:
         notes.append(
             f"strips meet at up to {steep:.0f} degrees; more strips, or max_crease, lower that"
         )
-    small = part_metrics(result.ruled.pattern)["part_area_min"]
     if small < _SMALL:
         notes.append(f"the smallest part has only {small:.2g} % of the area of all")
     return tuple(notes)
