@@ -357,15 +357,18 @@ class _Task:
     def _developable(self) -> list[Tried]:
         """Return the design, if it is developable and its pieces were not given.
 
-        Without a largest distance only designs with folds are kept, and none is opened that
-        closes around: one smooth strip has a smooth surface for CAD, too.
+        Without a largest distance none is opened that closes around, and, where strips along
+        lines are not wanted, only designs with folds are kept: one smooth strip has a smooth
+        surface for CAD, too.
         """
         asked = self.request
         if self.kept is None or not asked.may_keep_design:
             return []
         result = exact_strips(self.design, asked, self.kept)
-        folded = result is not None and (result.ruled.rulings.radii == 0).any()
-        if result is None or not (asked.max_deviation or (folded and _is_whole(self.design))):
+        if result is None:
+            return []
+        meant = asked.options.lines or bool((result.ruled.rulings.radii == 0).any())
+        if not (asked.max_deviation or (meant and _is_whole(self.design))):
             return []
         reasons = judge(result, asked.limits)
         return [Tried(result, ordered([*reasons, *against_sheet(result, asked)]))]
