@@ -387,3 +387,29 @@ def test_a_callback_ends_strips_along_a_direction():
     assert result.status is gso.Status.CANCELLED and result.ruled is None
     with pytest.raises(gso.MeshError, match="60 strips are too many"):
         gso.strips(triangles, strips=60, along="x")
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_a_turned_cylinder_has_its_own_rulings_without_a_limit(triangles):
+    u, v = np.mgrid[-1:1:33j, -1:1:33j]
+    turn = np.radians(30.0)
+    x, y = np.cos(turn) * u - np.sin(turn) * v, np.sin(turn) * u + np.cos(turn) * v
+    mesh = gso.as_mesh(np.stack([2 * np.sin(x / 2), y, 2 * np.cos(x / 2)], axis=-1))
+    if triangles:
+        mesh = gso.Mesh(mesh.vertices, mesh.triangles)
+    result = gso.strips(mesh)
+    assert result.usable and result.ruled.strips == 1 and result.ruled.farthest == 0.0
+    lines = np.array([bend.line for bend in result.folded.lines(result.pattern.flat)])
+    ways = (lines[:, 1] - lines[:, 0]) @ [1, 1j]
+    # Directions do not depend on the sign.
+    angles = np.degrees(np.angle(ways**2 / ways[0] ** 2)) / 2
+    assert len(lines) > 20
+    assert np.abs(angles).max() < 0.05
+
+
+def test_fair_creases_turn_little():
+    surface = LineStrips(scaled(dome())).strips(4).surface
+    turns = surface.creases.turns(surface.mesh.vertices)
+    a, b = surface.mesh.vertices[surface.creases.edges].transpose(1, 0, 2)
+    # Of a circle through the dome they would turn by about 50 degrees.
+    assert np.degrees(turns.sum()) < 100.0 * np.linalg.norm(b - a, axis=1).sum()

@@ -153,3 +153,26 @@ def test_strains_do_not_depend_on_the_unit(unit):
     scaled = grid.replaced(unit * grid.vertices)
     for measure in (metrics.corner_strains, metrics.stretches, metrics.area_error):
         assert np.array_equal(measure(scaled, unit * flat), measure(grid, flat))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_largest_distance_is_that_of_a_dense_sample(seed):
+    rng = np.random.default_rng(seed)
+    surfaces = []
+    for count, rough in ((rng.integers(4, 9), 0.3), (rng.integers(5, 14), 0.1)):
+        plane = np.stack(np.mgrid[-1 : 1 : count * 1j, -1 : 1 : count * 1j], axis=-1)
+        inner = plane[1:-1, 1:-1]
+        inner += rng.uniform(-0.3, 0.3, inner.shape) / count
+        height = rough * rng.normal(size=plane.shape[:2]) + 0.2 * plane[..., 0] ** 2
+        surfaces.append(Mesh.from_grid(np.dstack([plane, height])))
+    one, two = surfaces
+    found = metrics.farthest(one, two)
+    corner = one.vertices[one.triangles]
+    share = rng.dirichlet(np.ones(3), (len(corner), 4000))
+    # Edges and corners, too, where distances often are largest.
+    share[:, ::4, 0] = 0.0
+    share /= share.sum(axis=2, keepdims=True)
+    points = np.einsum("tsk,tkd->tsd", share, corner).reshape(-1, 3)
+    sampled = metrics.point_to_surface(np.r_[points, one.vertices], two).max()
+    assert sampled * (1 - 1e-9) <= found * (1 + 1e-3) + 1e-5
+    assert found <= 1.03 * sampled

@@ -88,7 +88,8 @@ def test_places_on_rulings_are_found():
 
 
 def test_a_cylinder_is_reproduced():
-    result = gso.tno.optimize(cylinder(33, turn=0.4), formulation="ruled")
+    options = gso.RuledOptions(lines=False)
+    result = gso.tno.optimize(cylinder(33, turn=0.4), options=options)
     strips = gso.smooth_strips(result.ruled, result.design)
     size = result.design.diagonal
     assert strips.is_torsal

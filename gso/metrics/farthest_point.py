@@ -89,6 +89,7 @@ def farthest(
         keep = far.max(axis=1) + side.max(axis=1) / np.sqrt(3.0) > enough
         # With one nearest triangle for all three corners, the bound is the largest distance there.
         keep &= (which != np.roll(which, 1, axis=1)).any(axis=1)
+        keep[keep] = _may_exceed_pair(enough, points[keep], other, which[keep])
         keep[keep] = _may_exceed(enough, points[keep], far[keep], corner, which[keep])
         points, far, which = points[keep], far[keep], which[keep]
         if not 0 < len(points) <= _MOST:
@@ -127,6 +128,54 @@ def _may_exceed(bound: float, points: Array, far: Array, corner: Array, which: I
     out = np.zeros(len(points), bool)
     out[left] = True
     return out
+
+
+def _may_exceed_pair(bound: float, points: Array, other: Mesh, which: Ints) -> Flags:
+    """Return whether distances within triangles (k, 3, 3) may exceed a bound, by pairs.
+
+    `which` are the triangles of `other` nearest to the corners. Where these are two with a common
+    edge, a point between the planes through their other edges, and between the ends of the common
+    one, is over one of them, or the common edge is nearest to it. Its distance is then at most the
+    larger one of its heights over both planes, over the cosine of half the angle between these.
+    """
+    out = np.ones(len(points), bool)
+    # Corners are turned so that the first and the last have different triangles.
+    first, last = which.min(axis=1), which.max(axis=1)
+    two = np.flatnonzero(((which == first[:, None]) | (which == last[:, None])).all(axis=1))
+    tables = [other.triangles[x[two]] for x in (first, last)]
+    same = tables[0][:, :, None] == tables[1][:, None, :]
+    joined = same.any(axis=(2)).sum(axis=1) == 2
+    two, same = two[joined], same[joined]
+    if not len(two):
+        return out
+    own = np.arange(len(two))
+    at, opposite = (same.any(axis=k).argmin(axis=1) for k in (2, 1))
+    table, beyond = (table[joined] for table in tables)
+    ids = [table[own, (at + k) % 3] for k in (1, 2, 0)]
+    a, b, c, d = other.vertices[np.stack([*ids, beyond[own, opposite]])]
+    edge, x = b - a, points[two]
+    normals = [cross(edge, c - a), cross(d - a, edge)]
+    normals = [n / np.maximum(lengths(n), 1e-300)[:, None] for n in normals]
+    height = [np.abs(_dots(x - a[:, None], n)).max(axis=1) for n in normals]
+    cosine = np.einsum("kd,kd->k", *normals)
+    share = _dots(x - a[:, None], edge)
+    inside = (share >= 0) & (share <= np.einsum("kd,kd->k", edge, edge)[:, None])
+    for tip, to in ((c, b), (c, a), (d, b), (d, a)):
+        # The side of the edge from the tip to one end of the common edge on which the other end is.
+        end = a if to is b else b
+        way = end - tip
+        square = np.maximum(np.einsum("kd,kd->k", way, way), 1e-300)
+        off = to - tip
+        inward = off - (np.einsum("kd,kd->k", off, way) / square)[:, None] * way
+        inside &= _dots(x - tip[:, None], inward) >= 0
+    most = np.maximum(*height) / np.sqrt(np.maximum(0.5 * (1.0 + cosine), 1e-300))
+    out[two[(cosine > 0) & inside.all(axis=1) & (most <= bound)]] = False
+    return out
+
+
+def _dots(vectors: Array, others: Array) -> Array:
+    """Return the products of vectors (k, 3, 3) with one other each (k, 3), (k, 3)."""
+    return np.asarray(np.einsum("kcd,kd->kc", vectors, others))
 
 
 def _from_triangle(points: Array, triangles: Array) -> Array:

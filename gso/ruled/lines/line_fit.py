@@ -30,7 +30,7 @@ _BACK, _OUTLINE = 0.5, 0.3
 #: Factor on tangential displacements.
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
-_PHASES = tuple((float(1.6**k), float(0.6**k)) for k in range(0, 21, 4))
+_PHASES = tuple((float(1.6**k), float(0.6**k)) for k in range(0, 21, 2))
 #: Least weight of these second differences.
 _FAIR = 0.4
 #: Weight of the places of the outline's corners, and the turning of the outline there, in degrees.

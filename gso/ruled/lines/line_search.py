@@ -34,9 +34,14 @@ _ALIKE = 1.25
 _GOOD = 0.5
 #: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
 _PLANAR = 0.2
-#: Whether to take the other kind of rulings, and fairness, one after the other until nothing folds;
-#: half of them for the second family.
-_SETTINGS = ((False, 0.4), (True, 0.4), (False, 0.05), (True, 0.05))
+#: Fairness of creases, and a lower one where strips are far away.
+_FAIR, _NEARER = 0.4, 0.05
+#: Whether to take the other kind of rulings, and fairness, one after the other until strips are
+#: sound and near; half of them for the second family. The second list is for strips that fold.
+_FIRST = (False, _FAIR)
+_IF_FAR = ((False, _NEARER), (True, _FAIR), (True, _NEARER))
+_IF_FOLDED = ((True, _FAIR), (False, _NEARER), (True, _NEARER))
+_SETTINGS = 1 + len(_IF_FAR)
 #: Ratio to the distance that is predicted for half as many strips from which others are tried.
 _WORSE = 3.0
 #: Distance of samples from one another's surfaces at which strips are the mesh.
@@ -184,23 +189,27 @@ class LineStrips:
             alike = choice.rank(count) <= _ALIKE * least
             if not alike and any(one.surface.sound and one.mean <= good for one in tried):
                 break
-            tried += self._settled(choice, lines, limit, len(_SETTINGS) >> place)
+            tried += self._settled(choice, lines, limit, _SETTINGS >> place)
             good = _GOOD * choice.rank(count)
         return tried
 
     def _settled(
-        self, choice: Choice, lines: Ints, limit: float, most: int = len(_SETTINGS)
+        self, choice: Choice, lines: Ints, limit: float, most: int = _SETTINGS
     ) -> list[Found]:
         """Solve for strips by one setting after the other, until they are sound and near."""
         tried: list[Found] = []
-        for turn, settings in enumerate(_SETTINGS[:most]):
-            found = self._solved(choice, lines, *settings)
+        settings = [_FIRST]
+        for turn in range(most):
+            found = self._solved(choice, lines, *settings[turn])
             if self.stopped:
                 break
+            sound = found is not None and found.surface.sound
+            if turn == 0:
+                settings += _IF_FAR if sound else _IF_FOLDED
             if found is None:
                 continue
             tried.append(found)
-            if found.surface.sound and (turn > 0 or found.surface.farthest <= limit):
+            if sound and (turn > 0 or found.surface.farthest <= limit):
                 break
         return tried
 

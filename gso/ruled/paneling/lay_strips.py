@@ -18,7 +18,7 @@ from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of, warning
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
-from gso.result import Result
+from gso.result import Result, StripsResult
 from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.along import Along
 from gso.ruled.paneling.exact_strips import exact_strips
@@ -315,8 +315,10 @@ class _Task:
         if self.request.along is not None:
             return (self._along_lines,)
         if self._many or self._counted:
-            return self._as_it_is, self._along_lines, self._as_a_whole
-        return self._as_it_is, self._as_a_whole, self._along_lines
+            others = self._along_lines, self._as_a_whole
+        else:
+            others = self._as_a_whole, self._along_lines
+        return self._as_it_is, self._kept_smooth, *others
 
     @property
     def _many(self) -> bool:
@@ -357,21 +359,38 @@ class _Task:
     def _developable(self) -> list[Tried]:
         """Return the design, if it is developable and its pieces were not given.
 
-        Without a largest distance none is opened that closes around, and, where strips along
-        lines are not wanted, only designs with folds are kept: one smooth strip has a smooth
-        surface for CAD, too.
+        Without a largest distance only designs with folds are kept at once, and none is opened
+        that closes around.
         """
-        asked = self.request
-        if self.kept is None or not asked.may_keep_design:
-            return []
-        result = exact_strips(self.design, asked, self.kept)
+        result = self._exact
         if result is None:
             return []
-        meant = asked.options.lines or bool((result.ruled.rulings.radii == 0).any())
-        if not (asked.max_deviation or (meant and _is_whole(self.design))):
+        folded = bool((result.ruled.rulings.radii == 0).any())
+        if not (self.request.max_deviation or (folded and _is_whole(self.design))):
             return []
-        reasons = judge(result, asked.limits)
-        return [Tried(result, ordered([*reasons, *against_sheet(result, asked)]))]
+        return [self._judged(result)]
+
+    def _kept_smooth(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
+        """Return the design with its own rulings, if it is developable and whole.
+
+        Its rulings are not along its lines. Where strips along lines are not wanted, neither are
+        these: only strips between rulings have a smooth surface for CAD.
+        """
+        result = self._exact if self.request.options.lines else None
+        if tried or result is None or not _is_whole(self.design):
+            return []
+        return [self._judged(result)]
+
+    @cached_property
+    def _exact(self) -> StripsResult | None:
+        """The design as it is, if it is developable and may be kept."""
+        if self.kept is None or not self.request.may_keep_design:
+            return None
+        return exact_strips(self.design, self.request, self.kept)
+
+    def _judged(self, result: StripsResult) -> Tried:
+        reasons = judge(result, self.request.limits)
+        return Tried(result, ordered([*reasons, *against_sheet(result, self.request)]))
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request

@@ -102,8 +102,9 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     if source is None:
         raise MeshError(
             "strips along lines of a mesh, designs that were kept as they are, and those "
-            "in files of an earlier version, have no smooth surfaces; take the planar faces, "
-            "gso.io.save_faces"
+            "in files of an earlier version, have no smooth surfaces; ask for strips between "
+            "rulings (RuledOptions(lines=False), --no-lines), or take the planar faces "
+            "(gso.io.save_faces)"
         )
     size = mesh.diagonal
     middle = mesh.vertices.mean(axis=0)
