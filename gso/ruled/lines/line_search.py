@@ -42,6 +42,8 @@ _FIRST = (False, _FAIR)
 _IF_FAR = ((False, _NEARER), (True, _FAIR), (True, _NEARER))
 _IF_FOLDED = ((True, _FAIR), (False, _NEARER), (True, _NEARER))
 _SETTINGS = 1 + len(_IF_FAR)
+#: Ratio to the largest allowed distance up to which less fair creases may hold it.
+_CLOSE = 1.3
 #: Ratio to the distance that is predicted for half as many strips from which others are tried.
 _WORSE = 3.0
 #: Distance of samples from one another's surfaces at which strips are the mesh.
@@ -84,6 +86,7 @@ class LineStrips:
         self.mesh, self.tell = mesh, tell
         self._copies = copies
         self.stopped = False
+        self._aim = np.inf
         self.results: dict[int, Found] = {}
         self._measured: set[int] = set()
         self.choices: list[Choice] = []
@@ -209,7 +212,9 @@ class LineStrips:
             if found is None:
                 continue
             tried.append(found)
-            if sound and (turn > 0 or found.surface.farthest <= limit):
+            far = found.surface.farthest
+            enough = far <= limit and not self._aim < far <= _CLOSE * self._aim
+            if sound and (turn > 0 or enough):
                 break
         return tried
 
@@ -248,7 +253,7 @@ class LineStrips:
         least = max(self.least, 1 if self.predicted(1) <= EXACT else 2)
         most = min(wanted.most, self.most)
         low, high = least - 1, None
-        aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
+        aim = self._aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
         for _ in range(_SOLVES):
             if not low < count <= most or self.stopped:
