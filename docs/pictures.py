@@ -2,7 +2,7 @@
 
 They are those of ``gso optimize --plot`` and ``gso plot --rulings``, reduced to a palette of 256
 colours, a third of the size; and a part, a sheet and the page of ``gso fabricate``. The last one is
-drawn where ``wkhtmltoimage`` is installed.
+drawn where Chromium is installed.
 """
 
 from __future__ import annotations
@@ -68,13 +68,12 @@ def workshop() -> None:
         name = max(job.parts, key=lambda part: len(part.bends)).name
         shutil.copy(Path(folder) / "parts" / f"{name}.svg", IMAGES / "part.svg")
         shutil.copy(Path(folder) / "sheets" / "sheet-1.svg", IMAGES / "sheet.svg")
-        program = shutil.which("wkhtmltoimage")
+        program = shutil.which("chromium") or shutil.which("google-chrome")
         if program is not None:
             page = Path(folder) / "page.png"
-            words = ["--quiet", "--width", "1000", "--height", "1100"]
-            subprocess.run(
-                [program, *words, str(Path(folder) / "index.html"), str(page)], check=True
-            )
+            words = ["--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=1100,1250"]
+            place = (Path(folder) / "index.html").as_uri()
+            subprocess.run([program, *words, f"--screenshot={page}", place], check=True)
             reduce("page", Image.open(page).convert("RGB"))
 
 

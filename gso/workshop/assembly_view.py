@@ -20,7 +20,7 @@ from gso.workshop.panels import Made, Panel
 #: Size of a picture, its margin and the height of its texts, in pixels; pixels of the image of
 #: the faces per pixel; points of a line at which it is looked for behind others, and their
 #: distance from faces.
-_SIZE, _MARGIN, _TALL, _FINE, _POINTS, _NEAR = 560, 12, 14, 2, 9, 3.0
+_SIZE, _MARGIN, _TALL, _FINE, _POINTS, _NEAR = 470, 12, 14, 2, 9, 3.0
 #: Lowest brightness, and the direction to the light.
 _DARK, _LIGHT = 0.45, np.array([-0.70, 0.50, 0.50])
 

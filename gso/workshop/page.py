@@ -134,14 +134,9 @@ def _legend() -> str:
 
 def _designs(designs: Sequence[Json]) -> str:
     heads = ("design", "copies", "parts", "parts per m²", "distance, mean mm", "largest mm")
-    more = (
-        "allowed mm",
-        "strain % (99 %)",
-        "smallest bend radius mm",
-        "seam mismatch mm",
-        "verdict",
-    )
-    rows = ["<table><tr>", *(f"<th>{h}</th>" for h in (*heads, *more, "verdict")), "</tr>"]
+    more = ("allowed mm", "strain % (99 %)", "smallest bend radius mm", "seam mismatch mm")
+    every = (*heads, *more, "verdict")
+    rows = ["<table><tr>", *(f"<th>{h}</th>" for h in every), "</tr>"]
     for one in designs:
         strain = one.get("strain_max")
         cells = [
