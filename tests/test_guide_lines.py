@@ -7,7 +7,17 @@ import pytest
 
 import gso
 from gso.geometry import in_front, nearest_triangles
-from gso.workshop import Drawing, Panel, assembly, guide_lines, of_surface, writers
+from gso.workshop import (
+    Drawing,
+    GuideLine,
+    Panel,
+    Part,
+    assembly,
+    guide_lines,
+    of_surface,
+    united,
+    writers,
+)
 
 
 def sheet(points, flat):
@@ -111,8 +121,11 @@ def test_hidden_lines_are_not_drawn():
     flat[4:] += [5.0, 0.0]
     made = of_surface("two", mesh, gso.Pattern(flat, mesh.faces, np.arange(8)), {})
     above, below = assembly(made, lambda name: f"#{name}")
-    count = [len(re.findall("<title", picture)) for picture in (above, below)]
-    assert count == [1, 2]
+    pictures = above, below
+    assert [len(re.findall("<title", picture)) for picture in pictures] == [1, 2]
+    rims = [re.search('<path class="rim" d="([^"]*)"', picture)[1] for picture in pictures]
+    # Eight edges are seen from below, and four from above.
+    assert [rim.count("M") for rim in rims] == [4, 8]
 
 
 def test_a_depth_buffer_is_right():
@@ -137,3 +150,51 @@ def test_points_in_front_are_seen():
     _, depth = nearest_triangles(plane, (9, 9))
     points = np.array([[4.0, 4, 2], [4, 4, 1], [4, 4, 0.5], [4, 4, 0]])
     assert in_front(points, depth, 0.6).tolist() == [True, True, True, False]
+
+
+def test_parts_with_other_guide_lines_are_not_the_same():
+    square = np.array([[0.0, 0], [50, 0], [50, 50], [0, 50]])
+    across, along = (
+        (GuideLine(line, 0.0),)
+        for line in (np.array([[25.0, 0], [25, 50]]), np.array([[0.0, 20], [50, 20]]))
+    )
+    parts = [Part("flat", square)]
+    parts += [Part(f"p{k}", square, guides=g) for k, g in enumerate((across, along, across))]
+    kept, same = united(parts)
+    assert [part.count for part in kept] == [1, 2, 1]
+    assert same == {"p2": "p0"}
+
+
+def test_a_narrow_strip_has_guide_lines_and_a_cap_has_none():
+    turn, y = np.mgrid[0:2:41j, 0:0.02:3j]
+    points = np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
+    assert guide_lines(sheet(points, np.stack([turn, y], axis=-1)))
+    y, x = np.mgrid[-1:1:17j, -1:1:17j]
+    cap = np.stack([x, y, np.sqrt(9.0 - x * x - y * y)], axis=-1)
+    guides = guide_lines(sheet(cap, cap[..., :2]))
+    assert all(np.degrees(guide.angle) <= 45.0 for guide in guides)
+
+
+def test_notes_tell_of_strips_and_not_of_kept_parts(tmp_path):
+    y, x = np.mgrid[-1:1:17j, -1:1:17j]
+    bump = np.stack([x, y, 0.25 * x * x - 0.4 * y * y], axis=-1)
+    design = gso.as_mesh(100.0 * bump)
+    done = gso.fabricate(design, tmp_path / "a", max_deviation="3%", scale=1.0)
+    (record,) = done.certificate["designs"]
+    assert record["crease_angle_max"] >= 0.0
+    # A polygon that is meant as one.
+    turn = 2 * np.pi * np.arange(20) / 20
+    polygon = gso.Mesh(
+        np.c_[100.0 * np.cos(turn), 100.0 * np.sin(turn), 0.0 * turn],
+        [[0, k, k + 1] for k in range(1, 19)],
+    )
+    done = gso.fabricate(polygon, tmp_path / "b")
+    assert done.usable
+    assert not any("polygons" in note for note in done.certificate["notes"])
+
+
+def test_the_table_of_designs_has_a_heading_for_each_column(tmp_path):
+    flat = gso.as_mesh(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))]))
+    assert gso.fabricate(flat, tmp_path).usable
+    table = (tmp_path / "index.html").read_text().split("<table>")[1].split("</table>")[0]
+    assert table.count("<th>") == table.count("<td>")

@@ -23,10 +23,11 @@ from gso.workshop import (
     Thickness,
     fitted,
     made,
+    origins,
     parts_from,
     thickened,
+    united,
 )
-from gso.workshop.congruent import origins, united
 from tests.test_pieces import dome
 
 

@@ -55,8 +55,8 @@ class _StripsJob(Job):
 @click.option(
     "--no-lines",
     is_flag=True,
-    help="No strips along lines of the mesh or of a grid: others become smooth surfaces in CAD "
-    "files.",
+    help="No strips along lines of the mesh or of a grid, and without --max-deviation no smooth "
+    "design as it is: others become smooth surfaces in CAD files.",
 )
 @click.option("--flats", is_flag=True, help="A single strip may branch at flat triangles.")
 @click.option(

@@ -24,7 +24,7 @@ from gso.geometry.cells import (
     isometry_defect,
 )
 from gso.geometry.closing import Closing, closing
-from gso.geometry.depth_buffer import in_front, nearest_triangles
+from gso.geometry.depth_buffer import in_front, nearest_triangles, roomiest_pixels
 from gso.geometry.differences import second_difference
 from gso.geometry.gauss_image import image_curvature, solid_angle
 from gso.geometry.parametric import smooth_gaussian_curvature
@@ -88,6 +88,7 @@ __all__ = [
     "quad_area_vectors",
     "quad_corner_vectors",
     "rest_frame",
+    "roomiest_pixels",
     "second_difference",
     "shape_matrix",
     "side_lengths",

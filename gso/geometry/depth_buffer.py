@@ -6,6 +6,9 @@ import numpy as np
 
 from gso.typing import Array, Flags, Ints
 
+#: Triangles that are drawn at a time.
+_BLOCK = 256
+
 
 def nearest_triangles(corners: Array, shape: tuple[int, int]) -> tuple[Ints, Array]:
     """Find the triangle that is nearest to the viewer in each pixel.
@@ -33,21 +36,26 @@ def nearest_triangles(corners: Array, shape: tuple[int, int]) -> tuple[Ints, Arr
     [[1, 1, 0], [1, 0, 0]]
     """
     rows, columns = shape
+    triangle = np.full(rows * columns, -1)
+    nearest = np.full(rows * columns, -np.inf)
+    for start in range(0, len(corners), _BLOCK):
+        owner, pixel, depth = _fragments(corners[start : start + _BLOCK], shape)
+        np.maximum.at(nearest, pixel, depth)
+        seen = depth == nearest[pixel]
+        triangle[pixel[seen]] = start + owner[seen]
+    return triangle.reshape(shape), nearest.reshape(shape)
+
+
+def _fragments(corners: Array, shape: tuple[int, int]) -> tuple[Ints, Ints, Array]:
+    """Return the pixels that triangles cover: the triangle, the pixel and the depth of each."""
+    rows, columns = shape
     owner, row, left, right, start, slope = _spans(corners, rows)
     first = np.clip(np.ceil(left - 0.5), 0, columns).astype(np.int64)
     count = np.clip(np.floor(right - 0.5).astype(np.int64) + 1, first, columns) - first
     span = np.repeat(np.arange(len(owner)), count)
     column = np.arange(len(span)) - np.repeat(np.cumsum(count) - count - first, count)
     depth = start[span] + slope[span] * (column + 0.5 - left[span])
-    pixel = row[span] * columns + column
-    order = np.lexsort((depth, pixel))
-    last = np.ones(len(order), bool)
-    last[:-1] = pixel[order[1:]] != pixel[order[:-1]]
-    top = order[last]
-    triangle = np.full(rows * columns, -1)
-    deep = np.full(rows * columns, -np.inf)
-    triangle[pixel[top]], deep[pixel[top]] = owner[span[top]], depth[top]
-    return triangle.reshape(shape), deep.reshape(shape)
+    return owner[span], row[span] * columns + column, depth
 
 
 def _spans(corners: Array, rows: int) -> tuple[Ints, Ints, Array, Array, Array, Array]:
@@ -91,3 +99,30 @@ def in_front(points: Array, depth: Array, near: float) -> Flags:
             row = np.clip(points[:, 1].astype(np.int64) + i, 0, rows - 1)
             np.minimum(farthest, depth[row, column], out=farthest)
     return np.asarray(points[:, 2] >= farthest - near)
+
+
+def roomiest_pixels(owner: Ints) -> dict[int, Array]:
+    """Return for each region the pixel (column, row) that is the farthest from other regions.
+
+    Parameters
+    ----------
+    owner : ndarray of int, (rows, columns)
+        Number of the region of each pixel; -1 for none.
+
+    Examples
+    --------
+    >>> roomiest_pixels(np.array([[-1, -1, -1], [4, 4, 4], [4, 4, 4], [4, 4, 4]]))
+    {4: array([1.5, 2.5])}
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    outer = np.pad(owner, 1, constant_values=-2)
+    inside = np.ones(owner.shape, bool)
+    for other in (outer[2:, 1:-1], outer[:-2, 1:-1], outer[1:-1, 2:], outer[1:-1, :-2]):
+        inside &= owner == other
+    room = distance_transform_edt(inside)
+    row, column = np.nonzero(owner >= 0)
+    number, far = owner[row, column], room[row, column]
+    order = np.lexsort((-far, number))
+    best = order[np.unique(number[order], return_index=True)[1]]
+    return {int(number[k]): np.array([column[k], row[k]]) + 0.5 for k in best}

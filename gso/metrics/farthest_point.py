@@ -32,6 +32,7 @@ def farthest(
 
     All points of the triangles count, not only the vertices. The distance from one triangle of
     `other` is convex, so it is largest at a corner: this bounds the distance within a triangle.
+    Over two triangles with a common edge it is bounded by the corners' heights over both planes.
     Triangles whose bound exceeds the largest distance so far are halved, across their longest edge.
 
     Parameters
@@ -139,7 +140,6 @@ def _may_exceed_pair(bound: float, points: Array, other: Mesh, which: Ints) -> F
     larger one of its heights over both planes, over the cosine of half the angle between these.
     """
     out = np.ones(len(points), bool)
-    # Corners are turned so that the first and the last have different triangles.
     first, last = which.min(axis=1), which.max(axis=1)
     two = np.flatnonzero(((which == first[:, None]) | (which == last[:, None])).all(axis=1))
     tables = [other.triangles[x[two]] for x in (first, last)]

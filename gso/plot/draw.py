@@ -79,7 +79,7 @@ class Panel:
         Polylines on the surface, in the same coordinates.
     circle : float
         Radius of a circle about the origin, behind the faces; 0 for none.
-    names : sequence of (str, ndarray (3,))
+    names : sequence of (str, ndarray (2,))
         Texts, and the points that they stand at.
     """
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import geometry
 from gso.components import split
 from gso.mesh import Mesh
 from gso.mesh.view import View, pale_colours
@@ -14,6 +15,8 @@ from gso.rulings import gauss_image, shape_operator, trace
 from gso.seams.segmentation import Segmentation, whole_pattern
 from gso.typing import Array, Ints
 
+#: Pixels along a picture in which parts are looked for.
+_PIXELS = 300
 #: Colours of neighbouring strips, and of flat regions.
 _STRIPS = np.array([(0.60, 0.71, 0.82), (0.78, 0.83, 0.72)])
 _FLAT = np.array((0.93, 0.78, 0.55))
@@ -79,13 +82,17 @@ def part_numbers(pattern: Pattern) -> Ints:
 
 
 def _named(panel: Panel, number: Ints) -> list[tuple[str, Array]]:
-    """Return the numbers of parts, each at the centroid of a face in its middle."""
-    middle = panel.points[panel.corners].mean(axis=1)
-    out = []
-    for k in np.unique(number).tolist():
-        own = middle[number == k]
-        out.append((str(k), own[int(((own - own.mean(axis=0)) ** 2).sum(axis=1).argmin())]))
-    return out
+    """Return the numbers of parts, each where there is most room on what is seen of it."""
+    low, high = panel.points[:, :2].min(axis=0), panel.points[:, :2].max(axis=0)
+    scale = _PIXELS / float((high - low).max())
+    placed = panel.points.copy()
+    placed[:, :2] -= low
+    corners = panel.corners
+    triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    wide, tall = (int(np.ceil(side)) for side in scale * (high - low))
+    seen, _ = geometry.nearest_triangles(scale * placed[triangles], (tall + 1, wide + 1))
+    owner = np.where(seen >= 0, np.tile(number, 2)[seen], -1)
+    return [(str(k), low + at / scale) for k, at in geometry.roomiest_pixels(owner).items()]
 
 
 def pieces(found: Segmentation) -> list[Panel]:
@@ -98,9 +105,8 @@ def pieces(found: Segmentation) -> list[Panel]:
         panel = Panel(side.project(surface.vertices), surface.faces, title, light=GRAZING)
         panel.tint = colours[found.of_face]
         panel.lines = list(panel.points[found.edges])
-        if side is view:
-            names = _named(panel, found.of_face)
-            panel.names = [(found.name(int(k)), at) for k, at in names]
+        names = _named(panel, found.of_face)
+        panel.names = [(found.name(int(k)), at) for k, at in names]
         panels.append(panel)
     own = [k for k, sheet in enumerate(found.sheets) if sheet is not None]
     if own:

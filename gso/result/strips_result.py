@@ -91,8 +91,9 @@ class StripsResult(Result):
         if self.ruled.untrimmed is None:
             io.save_faces(self.mesh, path, unit=unit)
             self.notes += (
-                f"{path} has planar faces: strips along lines have no smooth surfaces; those made "
-                "without lines (RuledOptions(lines=False), --no-lines) have",
+                f"{path} has planar faces: neither strips along lines nor designs that were kept "
+                "as they are have smooth surfaces; those made without lines "
+                "(RuledOptions(lines=False), --no-lines) have",
             )
             return
         # Constraints may have moved the strips away from the design.

@@ -8,6 +8,7 @@ millimetres (:func:`fitted`) and become parts (:func:`parts_from`), and parts ar
 
 from gso.pattern import Bend
 from gso.workshop.assembly_view import assembly
+from gso.workshop.congruent import origins, united
 from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.fabrication_settings import FabricationSettings
@@ -42,8 +43,10 @@ __all__ = [
     "nest",
     "of_net",
     "of_surface",
+    "origins",
     "parts_from",
     "thickened",
+    "united",
     "with_tabs",
     "without_tabs",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from xml.etree.ElementTree import SubElement, tostring
 
 import numpy as np
@@ -35,7 +35,7 @@ def assembly(made: Made, link: Callable[[str], str]) -> list[str]:
     ----------
     made : Made
     link : callable
-        Gives the address of what is shown when a panel's name is clicked.
+        Gives the address of what is shown when a panel's name is clicked; empty for none.
 
     Returns
     -------
@@ -83,9 +83,10 @@ def _drawn(view: View, made: Made, link: Callable[[str], str]) -> str:
             for panel, own, turn in zip(made.panels, placed, turned, strict=True)
         ]
         page.path(page.root, np.concatenate(drawn), kind=kind)
-    for number, middle in _roomiest(np.where(shown, owner[triangle], -1)):
+    for number, middle in geometry.roomiest_pixels(np.where(shown, owner[triangle], -1)).items():
         name, (column, row) = made.panels[number].name, middle / _FINE
-        target = SubElement(page.root, "a", {"href": link(name)})
+        address = link(name)
+        target = SubElement(page.root, "a", {"href": address} if address else {})
         SubElement(target, "title").text = name
         at = np.array([column, high[1] - row - 0.36 * _TALL])
         page.text(target, _short(name, made.name), at, 0.72 * _TALL)
@@ -128,23 +129,6 @@ def _tones(corners: Array, colours: Array) -> np.ndarray:
     lit = np.abs(normal @ _LIGHT) / (length * np.linalg.norm(_LIGHT))
     bright = _DARK + (1.0 - _DARK) * lit
     return np.asarray(np.round(255.0 * colours * bright[:, None]).astype(np.uint8))
-
-
-def _roomiest(owner: Ints) -> Iterator[tuple[int, Array]]:
-    """Give for each region the pixel (column, row) that is the farthest from other regions."""
-    from scipy.ndimage import distance_transform_edt
-
-    outer = np.pad(owner, 1, constant_values=-2)
-    inside = np.ones(owner.shape, bool)
-    for other in (outer[2:, 1:-1], outer[:-2, 1:-1], outer[1:-1, 2:], outer[1:-1, :-2]):
-        inside &= owner == other
-    room = distance_transform_edt(inside)
-    row, column = np.nonzero(owner >= 0)
-    number, far = owner[row, column], room[row, column]
-    order = np.lexsort((-far, number))
-    best = order[np.unique(number[order], return_index=True)[1]]
-    for k in best.tolist():
-        yield int(number[k]), np.array([column[k], row[k]]) + 0.5
 
 
 def _png(image: np.ndarray) -> bytes:

@@ -15,6 +15,8 @@ from gso.workshop.part import Part
 _SAME = 1e-6
 #: Largest distance between parts that are the same, in millimetres and relative to their size.
 _PARTS = (0.01, 1e-5)
+#: Largest distance of their guide lines, relative to their size.
+_GUIDES = 0.01
 #: Largest difference of their angles of bends, in radians.
 _ANGLE = 1e-3
 
@@ -59,7 +61,8 @@ def congruent(one: Mesh, two: Mesh) -> bool:
 def united(parts: Sequence[Part]) -> tuple[list[Part], dict[str, str]]:
     """Unite parts that are the same, and add up how many are needed.
 
-    They have the same outline, holes, bends, marks and notches; their names do not matter.
+    They have the same outline, holes, bends, guide lines, marks and notches; their names do not
+    matter.
 
     Returns
     -------
@@ -72,7 +75,8 @@ def united(parts: Sequence[Part]) -> tuple[list[Part], dict[str, str]]:
     alike: dict[tuple[object, ...], list[int]] = {}
     same: dict[str, str] = {}
     for part in parts:
-        lines = tuple(len(x) for x in (part.holes, part.bends, part.creases, part.marks))
+        own = (part.holes, part.bends, part.guides, part.creases, part.marks)
+        lines = tuple(len(x) for x in own)
         texts = tuple(sorted(notch.text for notch in part.notches))
         others = alike.setdefault((lines, texts, part.grain is None), [])
         for k in others:
@@ -119,6 +123,8 @@ def _equal(one: Part, two: Part, most: float) -> bool:
         n.text != two.notches[k].text for n, k in zip(one.notches, pairs.tolist(), strict=True)
     ):
         return False
+    if not _guided_alike(one, two, most):
+        return False
     middles = [[bend.line.mean(axis=0) for bend in p.bends] for p in (one, two)]
     pairs = _paired(middles[0], middles[1], most)
     if pairs is None:
@@ -129,6 +135,18 @@ def _equal(one: Part, two: Part, most: float) -> bool:
         if ends > most or abs(bend.angle - other.angle) > _ANGLE:
             return False
     return True
+
+
+def _guided_alike(one: Part, two: Part, most: float) -> bool:
+    """Tell whether the guide lines of two parts are in the same places."""
+    import shapely
+
+    if not one.guides:
+        return not two.guides
+    lines = [[shapely.LineString(guide.line) for guide in p.guides] for p in (one, two)]
+    # They are traced, and drawn with fewer points: their ends are less exact than outlines.
+    far = shapely.hausdorff_distance(*map(shapely.MultiLineString, lines))
+    return bool(far <= max(most, _GUIDES * max(one.size)))
 
 
 def _paired(one: Sequence[Array], two: Sequence[Array], most: float) -> Ints | None:

@@ -170,7 +170,8 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     made_of = (found.face, _cad_faces(given.mesh, found.recognised))
     drawn = (found.bends, found.zones, found.seam_angles, made_of)
     one = of_surface(given.name, found.surface, found.pattern, record, *drawn)
-    one = replace(one, reasons=compare(crossed(given.mesh), {}))
+    panels = tuple(replace(panel, is_kept=True) for panel in one.panels)
+    one = replace(one, panels=panels, reasons=compare(crossed(given.mesh), {}))
     return _checked(_bent(one), settings)
 
 

@@ -296,7 +296,7 @@ def fabricate(
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
-        said = [*strip_notes(fit.panels, record), *outline_notes(record)]
+        said = [*strip_notes(fit.panels, record), *outline_notes(fit.panels, record)]
         said += without_tabs(bare) if asked.tabs else []
         is_kept = one.record["deviation_max"] == 0.0
         if is_kept and settings.formulation == "ruled" and one.record["strain_max"] > EXACT:

@@ -114,6 +114,7 @@ def _record(design: Mesh, settings: FabricationSettings, some: Sequence[Json]) -
     """Return what was measured on all parts together."""
     areas = [one["area"] for one in some]
     far = max(some, key=lambda one: one["deviation_max"])
+    creases = [one["crease_angle_max"] for one in some if "crease_angle_max" in one]
     worst = ("deviation_max", "strain_max", "strain_p99", "planarity_max")
     return {
         **far,
@@ -127,4 +128,5 @@ def _record(design: Mesh, settings: FabricationSettings, some: Sequence[Json]) -
         "curvature": np.max([one["curvature"] for one in some], axis=0).tolist(),
         "strips": [number for one in some for number in one["strips"]],
         "bend_radius_min": min(one["bend_radius_min"] for one in some),
+        **({"crease_angle_max": max(creases)} if creases else {}),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from html import escape
+from itertools import islice
 from xml.etree.ElementTree import tostring
 
 import numpy as np
@@ -19,8 +20,8 @@ from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
 
-#: Number of parts that are drawn, and the least number other than 0 that is written.
-_SHOWN, _LEAST = 120, 0.001
+#: Numbers of parts and of designs that are drawn, and the least number but 0 that is written.
+_SHOWN, _PICTURED, _LEAST = 120, 12, 0.001
 _STYLE = """
 body { font: 14px system-ui, sans-serif; margin: 2em; color: #222; }
 table { border-collapse: collapse; margin: 1em 0; }
@@ -75,7 +76,7 @@ def page(
         ]
     lines += [f"<p>{escape(note)}</p>" for note in certificate["notes"]]
     lines.append(_designs(certificate["designs"]))
-    for made in found:
+    for made in islice(found, _PICTURED):
         lines.append(f"<h2>{escape(made.name)}: the parts in their places</h2>")
         titles = ("from the front; thin lines are bends", "from behind")
         for picture, said in zip(assembly(made, address), titles, strict=True):
@@ -92,7 +93,7 @@ def page(
         text += "".join(f"; {zone.in_words()}" for zone in part.zones)
         text += f"; made of {part.made_of}" if part.faces else ""
         text += _guided(part)
-        lines.append(_figure(Drawing((part,)), text, 240, address(part.name)[1:]))
+        lines.append(_figure(Drawing((part,)), text, 240, address(part.name).lstrip("#")))
     if len(parts) > _SHOWN:
         lines.append(f"<p>and {len(parts) - _SHOWN} more</p>")
     return "\n".join([*lines, "</html>"]) + "\n"
@@ -107,14 +108,18 @@ def _guided(part: Part) -> str:
 
 
 def _addresses(certificate: Json, parts: Sequence[Part]) -> Callable[[str], str]:
-    """Return a function that gives the place on the page of the part that a panel is made as."""
+    """Return a function that gives the place on the page of the part that a panel is made as.
+
+    It is empty for parts that are not drawn.
+    """
     names = [part.name for part in parts]
     own = dict(zip(names, strokes.identifiers(parts), strict=True))
     for record in certificate["designs"]:
         for entry in record.get("parts", ()):
             if entry["same_as"]:
                 own[entry["name"]] = own[entry["same_as"]]
-    return lambda name: f"#part-{own[name]}"
+    shown = {own[name] for name in names[:_SHOWN]}
+    return lambda name: f"#part-{own[name]}" if own[name] in shown else ""
 
 
 def _colours() -> str:

@@ -40,6 +40,8 @@ class Panel:
         Round faces, which are bent as a whole.
     faces : tuple of str
         Names of the faces of a CAD file that it is made of.
+    is_kept : bool
+        Whether it is developable as it is: its folds and bends are those of the design.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Panel:
     zone: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     zones: tuple[Zone, ...] = ()
     faces: tuple[str, ...] = ()
+    is_kept: bool = False
 
     def __post_init__(self) -> None:
         if not len(self.zone):
@@ -182,7 +185,7 @@ class Made:
     def arrays(self) -> dict[str, np.ndarray]:
         """Return panels and seams as arrays by name."""
         said = json.dumps(
-            [[panel.name, panel.zones, panel.faces] for panel in self.panels]
+            [[panel.name, panel.zones, panel.faces, panel.is_kept] for panel in self.panels]
         ).encode()
         out: dict[str, np.ndarray] = {"names": np.frombuffer(said, np.uint8)}
         for k, panel in enumerate(self.panels):
@@ -216,14 +219,14 @@ class Made:
         """
         try:
             panels = []
-            for k, (own, zones, faces) in enumerate(json.loads(data["names"].tobytes())):
+            for k, (own, zones, faces, is_kept) in enumerate(json.loads(data["names"].tobytes())):
                 points, table, flat, bends, turns, radii, zone = (
                     data[f"panel{k}_{part}"] for part in _ARRAYS
                 )
                 surface = Mesh(points, table)
                 known = tuple(Zone(*row) for row in zones)
                 lines = (bends, turns, radii, zone, known)
-                panels.append(Panel(str(own), surface, flat, *lines, tuple(faces)))
+                panels.append(Panel(str(own), surface, flat, *lines, tuple(faces), is_kept))
             stops = np.cumsum(data["seam_count"])[:-1]
             numbers, common, angles = (
                 data[f"seam_{part}"].tolist() for part in ("number", "common", "angle")

@@ -69,8 +69,8 @@ class GuideLine(NamedTuple):
     line : ndarray, (k, 2)
         Its points.
     angle : float
-        Angle in radians by which it is not straight: that between a circular arc of the same
-        length and height and its chord, at the ends.
+        Angle in radians by which it is not straight: that between its chord and a circular arc
+        of the same chord and height, at their ends.
     """
 
     line: Array

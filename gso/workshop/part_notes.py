@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gso.typing import Json
+from gso.workshop.certificate import chord
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Panel
 
@@ -17,6 +18,8 @@ _COARSE = 5e-4
 def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
     """Return notes on the strips of a design: folds, tight bends, steep creases, small parts.
 
+    Panels that are developable as they are do not count: their folds and bends are meant.
+
     Parameters
     ----------
     panels : sequence of Panel
@@ -24,20 +27,39 @@ def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
     record : dict
         Of the design, in millimetres.
     """
-    if "crease_angle_max" not in record:
+    own = [k for k, panel in enumerate(panels) if not panel.is_kept]
+    if "crease_angle_max" not in record or not own:
         return []
-    from gso.ruled.paneling.shop_notes import said
+    from gso.ruled.paneling.shop_notes import Advice, said
 
-    angles = np.concatenate([panel.angles for panel in panels])
-    radii = np.concatenate([panel.radii for panel in panels])
+    bends = [bend for k in own for bend in panels[k].lines]
     areas = [part["area"] for part in record["parts"]]
-    small = 100.0 * min(areas) / sum(areas)
-    return list(said(angles, radii, record["size"], record["crease_angle_max"], small, "mm"))
+    advice = Advice(
+        "mm",
+        gentle="a smaller max_deviation makes more strips, which are bent more gently, and "
+        "min_radius refuses this",
+        tight="give min_radius if that cannot be bent",
+        steep="a smaller max_deviation makes more strips, which meet at smaller angles",
+    )
+    return list(
+        said(
+            np.array([bend.angle for bend in bends]),
+            np.array([bend.radius for bend in bends]),
+            record["size"],
+            record["crease_angle_max"],
+            100.0 * min(areas[k] for k in own) / sum(areas),
+            advice,
+        )
+    )
 
 
-def outline_notes(record: Json) -> list[str]:
-    """Return a note on outlines that are coarse polygons."""
-    far = max(part["chord"] for part in record["parts"])
+def outline_notes(panels: Sequence[Panel], record: Json) -> list[str]:
+    """Return a note on outlines that are coarse polygons, of panels that were made.
+
+    The outlines of panels that are developable as they are may be meant as polygons.
+    """
+    own = [chord(panel.flat[loop]) for panel in panels if not panel.is_kept for loop in panel.loops]
+    far = max(own, default=0.0)
     if far <= _COARSE * record["size"]:
         return []
     return [
@@ -47,14 +69,21 @@ def outline_notes(record: Json) -> list[str]:
 
 
 def guide_notes(records: Sequence[Json], settings: FabricationSettings) -> list[str]:
-    """Return a note on parts without bend lines."""
+    """Return notes on curved parts without bend lines."""
     every = [part for record in records for part in record.get("parts", ())]
     guided = [part["guide_angle_max"] for part in every if part["guide_lines"]]
-    if not guided:
-        return []
+    bare = sum(part["curved"] and not part["guide_lines"] for part in every)
     why = ": no strip follows them closely enough" if settings.formulation == "ruled" else ""
-    return [
-        f"{len(guided)} of {len(every)} parts are curved and have no bend lines{why}; their guide "
-        f"lines, along which they are curved least, are up to {max(guided):.2g} degrees from "
-        "straight"
-    ]
+    notes = []
+    if guided:
+        notes.append(
+            f"{len(guided)} of {len(every)} parts are curved and have no bend lines{why}; their "
+            "guide lines, along which they are curved least, are up to "
+            f"{max(guided):.2g} degrees from straight"
+        )
+    if bare:
+        notes.append(
+            f"{bare} of {len(every)} parts are curved in all directions and have neither bend "
+            "lines nor guide lines; they are nearly developable, and have to be formed by hand"
+        )
+    return notes

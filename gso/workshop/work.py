@@ -25,7 +25,7 @@ from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
-_FORMAT = 8
+_FORMAT = 9
 
 
 def key(design: Design, settings: FabricationSettings) -> str:

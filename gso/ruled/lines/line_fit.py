@@ -31,8 +31,8 @@ _BACK, _OUTLINE = 0.5, 0.3
 _TANGENTIAL = 0.02
 #: Weights of coplanarity and of second differences of the displacement, by round.
 _PHASES = tuple((float(1.6**k), float(0.6**k)) for k in range(0, 21, 2))
-#: Least weight of these second differences.
-_FAIR = 0.4
+#: Least weight of these second differences: how fair creases are.
+FAIR = 0.4
 #: Weight of the places of the outline's corners, and the turning of the outline there, in degrees.
 _CORNERS, _SHARP = 3.0, 30.0
 #: Weight of coplanarity when it becomes exact, rounds of that, updates of multipliers in each, and
@@ -79,7 +79,7 @@ class LineFitter:
         polygons: Polygons,
         start: Array,
         *,
-        fairness: float = _FAIR,
+        fairness: float = FAIR,
         tangential: float = _TANGENTIAL,
     ) -> Array:
         """Fit strips, from positions (n, 3) of the mesh's vertices; return their positions.

@@ -14,7 +14,7 @@ from gso.mesh import Mesh
 from gso.ruled.lines.free_rulings import free_rulings, single
 from gso.ruled.lines.line_choice import Choice
 from gso.ruled.lines.line_families import families
-from gso.ruled.lines.line_fit import LineFitter
+from gso.ruled.lines.line_fit import FAIR, LineFitter
 from gso.ruled.lines.line_surface import line_surface
 from gso.ruled.lines.line_twist import alignment
 from gso.ruled.lines.polygons import Polygons
@@ -34,13 +34,13 @@ _ALIKE = 1.25
 _GOOD = 0.5
 #: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
 _PLANAR = 0.2
-#: Fairness of creases, and a lower one where strips are far away.
-_FAIR, _NEARER = 0.4, 0.05
+#: Fairness of creases where strips are far away otherwise.
+_NEARER = 0.05
 #: Whether to take the other kind of rulings, and fairness, one after the other until strips are
 #: sound and near; half of them for the second family. The second list is for strips that fold.
-_FIRST = (False, _FAIR)
-_IF_FAR = ((False, _NEARER), (True, _FAIR), (True, _NEARER))
-_IF_FOLDED = ((True, _FAIR), (False, _NEARER), (True, _NEARER))
+_FIRST = (False, FAIR)
+_IF_FAR = ((False, _NEARER), (True, FAIR), (True, _NEARER))
+_IF_FOLDED = ((True, FAIR), (False, _NEARER), (True, _NEARER))
 _SETTINGS = 1 + len(_IF_FAR)
 #: Ratio to the largest allowed distance up to which less fair creases may hold it.
 _CLOSE = 1.3
@@ -86,7 +86,6 @@ class LineStrips:
         self.mesh, self.tell = mesh, tell
         self._copies = copies
         self.stopped = False
-        self._aim = np.inf
         self.results: dict[int, Found] = {}
         self._measured: set[int] = set()
         self.choices: list[Choice] = []
@@ -167,23 +166,31 @@ class LineStrips:
         best = min(tried, key=lambda found: found.order, default=None)
         return None if best is None else self._measure(best)
 
-    def _solve(self, count: int) -> None:
-        """Solve for a number of strips; their largest distance is that of samples."""
+    def _solve(self, count: int, aim: float = np.inf) -> None:
+        """Solve for a number of strips; their largest distance is that of samples.
+
+        Strips that are no farther than `aim` come first.
+        """
         if count in self.results or self.stopped:
             return
         half = max(count // 2, 1)
         limit = _WORSE * self.predicted(half)
         own = len(self.choices)
-        tried = self._tried(count, limit, self.choices)
+        tried = self._tried(count, limit, self.choices, aim)
         poor = all(_distance(found) > (False, limit) for found in tried)
         if poor and not self.stopped and self.add_copies():
-            tried += self._tried(count, limit, self.choices[own:])
+            tried += self._tried(count, limit, self.choices[own:], aim)
         if tried:
-            best = self.results[count] = min(tried, key=lambda found: found.order)
+            best = self.results[count] = min(
+                tried,
+                key=lambda one: (not one.surface.sound, one.surface.farthest > aim, one.order),
+            )
             if half >= max(self.least, 2) and _distance(best) > (False, limit):
                 self._solve(half)
 
-    def _tried(self, count: int, limit: float, choices: Sequence[Choice]) -> list[Found]:
+    def _tried(
+        self, count: int, limit: float, choices: Sequence[Choice], aim: float
+    ) -> list[Found]:
         """Solve for strips along the best of some families of lines."""
         tried: list[Found] = []
         good, least = 0.0, np.inf
@@ -192,14 +199,22 @@ class LineStrips:
             alike = choice.rank(count) <= _ALIKE * least
             if not alike and any(one.surface.sound and one.mean <= good for one in tried):
                 break
-            tried += self._settled(choice, lines, limit, _SETTINGS >> place)
+            tried += self._settled(choice, lines, limit, _SETTINGS >> place, aim)
             good = _GOOD * choice.rank(count)
         return tried
 
     def _settled(
-        self, choice: Choice, lines: Ints, limit: float, most: int = _SETTINGS
+        self,
+        choice: Choice,
+        lines: Ints,
+        limit: float,
+        most: int = _SETTINGS,
+        aim: float = np.inf,
     ) -> list[Found]:
-        """Solve for strips by one setting after the other, until they are sound and near."""
+        """Solve for strips by one setting after the other, until they are sound and near.
+
+        Near is within `limit`, and not just beyond `aim`.
+        """
         tried: list[Found] = []
         settings = [_FIRST]
         for turn in range(most):
@@ -213,7 +228,7 @@ class LineStrips:
                 continue
             tried.append(found)
             far = found.surface.farthest
-            enough = far <= limit and not self._aim < far <= _CLOSE * self._aim
+            enough = far <= limit and not aim < far <= _CLOSE * aim
             if sound and (turn > 0 or enough):
                 break
         return tried
@@ -253,12 +268,12 @@ class LineStrips:
         least = max(self.least, 1 if self.predicted(1) <= EXACT else 2)
         most = min(wanted.most, self.most)
         low, high = least - 1, None
-        aim = self._aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
+        aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
         for _ in range(_SOLVES):
             if not low < count <= most or self.stopped:
                 break
-            self._solve(count)
+            self._solve(count, aim)
             if self._meets(wanted, count):
                 high = count
                 count = count - 1 if count - low <= 3 else (low + count) // 2

@@ -41,8 +41,9 @@ class Options(BaseOptions):
         Smallest radius of the bends, in the unit of the mesh; a result with a smaller one is not
         usable.
     lines : bool
-        Whether several strips may run along lines of the design, or of a grid laid over it: they
-        are mostly nearer, but only others become smooth surfaces in CAD files.
+        Whether several strips may run along lines of the design, or of a grid laid over it, and a
+        developable design may be kept without a largest distance: they are mostly nearer, but only
+        others become smooth surfaces in CAD files.
     starts : tuple of str
         Surfaces whose normals give first rulings: "design", "curvature" (the design made
         developable by that formulation). The best result of all is kept. A warm start `x0`

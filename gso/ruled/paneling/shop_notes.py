@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gso.result import Result, StripsResult
@@ -13,6 +15,26 @@ from gso.wording import length
 _SHARP, _STEEP = 45.0, 90.0
 #: Radius of a bend, relative to the design's size, and share of the area of a part, in %.
 _TIGHT, _SMALL = 1e-3, 0.4
+
+
+class Advice(NamedTuple):
+    """The unit of lengths in notes, and what to do.
+
+    Attributes
+    ----------
+    unit : str
+        Name of the unit; empty for that of the design.
+    gentle, tight, steep : str
+        What to do about sharp folds, tight bends and steep creases.
+    """
+
+    unit: str = ""
+    gentle: str = "more strips, or min_radius, bend it more gently"
+    tight: str = "give min_radius if that cannot be bent"
+    steep: str = "more strips, or max_crease, lower that"
+
+
+_ADVICE = Advice()
 
 
 def shop_notes(result: Result) -> tuple[str, ...]:
@@ -28,7 +50,12 @@ def shop_notes(result: Result) -> tuple[str, ...]:
 
 
 def said(
-    angles: Array, radii: Array, size: float, steep: float, small: float, unit: str = ""
+    angles: Array,
+    radii: Array,
+    size: float,
+    steep: float,
+    small: float,
+    advice: Advice = _ADVICE,
 ) -> tuple[str, ...]:
     """Say what is sharp, tight, steep or small.
 
@@ -42,29 +69,25 @@ def said(
         Largest angle between strips, in degrees.
     small : float
         Area of the smallest part, in % of all.
-    unit : str
-        Name of the unit of length; empty for that of the design.
+    advice : Advice, optional
     """
     notes = []
     sharp = np.degrees(np.abs(angles))
     if (folded := int((sharp > _SHARP).sum())) > 0:
         where = "one ruling" if folded == 1 else f"{folded} rulings, each on its own"
         notes.append(
-            f"the surface folds by up to {sharp.max():.0f} degrees at {where}; more strips, or "
-            "min_radius, bend it more gently"
+            f"the surface folds by up to {sharp.max():.0f} degrees at {where}; {advice.gentle}"
         )
     tight = int((radii < _TIGHT * size).sum())
     if tight:
         bends = "one bend is" if tight == 1 else f"{tight} bends are"
-        least = f"{length(float(radii.min()))} {unit}".strip()
+        least = f"{length(float(radii.min()))} {advice.unit}".strip()
         notes.append(
             f"{bends} tighter than {100 * _TIGHT:g} % of the design's size, with radii from "
-            f"{least}; give min_radius if that cannot be bent"
+            f"{least}; {advice.tight}"
         )
     if steep > _STEEP:
-        notes.append(
-            f"strips meet at up to {steep:.0f} degrees; more strips, or max_crease, lower that"
-        )
+        notes.append(f"strips meet at up to {steep:.0f} degrees; {advice.steep}")
     if small < _SMALL:
         notes.append(f"the smallest part has only {small:.2g} % of the area of all")
     return tuple(notes)
