@@ -8,6 +8,7 @@ import pytest
 import gso
 from gso.mesh import Mesh
 from gso.ruled.lines import LineStrips, families
+from gso.ruled.solve import Wanted
 
 
 def scaled(points) -> Mesh:
@@ -413,3 +414,12 @@ def test_fair_creases_turn_little():
     a, b = surface.mesh.vertices[surface.creases.edges].transpose(1, 0, 2)
     # Of a circle through the dome they would turn by about 50 degrees.
     assert np.degrees(turns.sum()) < 100.0 * np.linalg.norm(b - a, axis=1).sum()
+
+
+def test_creases_are_less_fair_where_that_holds_the_distance():
+    mesh = scaled(dome())
+    fair = LineStrips(mesh).strips(6).surface.farthest
+    wanted = Wanted(None, 64, False, 0.97 * fair, None, None, 64)
+    found = LineStrips(mesh).within(wanted)
+    assert found.surface.strips == 6
+    assert found.surface.farthest <= wanted.max_deviation
