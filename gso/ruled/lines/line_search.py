@@ -52,6 +52,8 @@ _SAME = 1e-7
 EXACT = 1e-5
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
+#: Solves without any sound strips after which the search ends.
+_FOLDED = 3
 
 
 class LineStrips:
@@ -270,10 +272,15 @@ class LineStrips:
         low, high = least - 1, None
         aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
+        hopeless = 0
         for _ in range(_SOLVES):
             if not low < count <= most or self.stopped:
                 break
             self._solve(count, aim)
+            if not any(one.surface.sound for one in self.results.values()):
+                hopeless += 1
+                if hopeless == _FOLDED:
+                    break
             if self._meets(wanted, count):
                 high = count
                 count = count - 1 if count - low <= 3 else (low + count) // 2
