@@ -124,10 +124,11 @@ def every_line(mesh: gso.Mesh, count: int) -> tuple[float, float]:
             continue
         try:
             polygons = Cells(family, kept).polygons
+            surface = line_surface(unit, polygons, planarised(polygons, unit.vertices))
         except gso.MeshError:
+            # Corners may run together.
             continue
-        points = planarised(polygons, unit.vertices)
-        far = line_surface(unit, polygons, points).distances(unit, sampled=True)
+        far = surface.distances(unit, sampled=True)
         tried = far.mean, far.largest
         best = min(best, tried, key=lambda one: one[1])
     return 100.0 * best[0], 100.0 * best[1]
