@@ -121,6 +121,14 @@ def _grouped(label: Ints) -> list[Ints]:
     return [order[a:b] for a, b in pairwise(ends)]
 
 
+def largest_first(mesh: Mesh) -> list[Component]:
+    """Split a mesh into its components, the one with the largest area first.
+
+    Parts of patterns are numbered in this order.
+    """
+    return sorted(split(mesh), key=lambda part: -part.area)
+
+
 def combined(
     several: Sequence[Mapping[str, float]], areas: Sequence[float], info: Mapping[str, Info] = INFO
 ) -> dict[str, float]:

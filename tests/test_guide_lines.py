@@ -165,7 +165,7 @@ def test_parts_with_other_guide_lines_are_not_the_same():
     assert same == {"p2": "p0"}
 
 
-def test_a_narrow_strip_has_guide_lines_and_a_cap_has_none():
+def test_a_narrow_strip_has_guide_lines_and_those_of_a_cap_are_nearly_straight():
     turn, y = np.mgrid[0:2:41j, 0:0.02:3j]
     points = np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
     assert guide_lines(sheet(points, np.stack([turn, y], axis=-1)))

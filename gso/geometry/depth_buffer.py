@@ -50,10 +50,7 @@ def _fragments(corners: Array, shape: tuple[int, int]) -> tuple[Ints, Ints, Arra
     """Return the pixels that triangles cover: the triangle, the pixel and the depth of each."""
     rows, columns = shape
     owner, row, left, right, start, slope = _spans(corners, rows)
-    first = np.clip(np.ceil(left - 0.5), 0, columns).astype(np.int64)
-    count = np.clip(np.floor(right - 0.5).astype(np.int64) + 1, first, columns) - first
-    span = np.repeat(np.arange(len(owner)), count)
-    column = np.arange(len(span)) - np.repeat(np.cumsum(count) - count - first, count)
+    span, column = _covered(left, right, columns)
     depth = start[span] + slope[span] * (column + 0.5 - left[span])
     return owner[span], row[span] * columns + column, depth
 
@@ -65,10 +62,7 @@ def _spans(corners: Array, rows: int) -> tuple[Ints, Ints, Array, Array, Array, 
     and how that grows with the column.
     """
     low, high = corners[..., 1].min(axis=1), corners[..., 1].max(axis=1)
-    first = np.clip(np.ceil(low - 0.5), 0, rows).astype(np.int64)
-    count = np.clip(np.floor(high - 0.5).astype(np.int64) + 1, first, rows) - first
-    owner = np.repeat(np.arange(len(corners)), count)
-    row = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count - first, count)
+    owner, row = _covered(low, high, rows)
     left, right = np.full(len(owner), np.inf), np.full(len(owner), -np.inf)
     start, end = np.zeros(len(owner)), np.zeros(len(owner))
     for k in range(3):
@@ -83,6 +77,17 @@ def _spans(corners: Array, rows: int) -> tuple[Ints, Ints, Array, Array, Array, 
     slope = (end - start) / np.where(right > left, right - left, 1.0)
     known = np.flatnonzero(right >= left)
     return owner[known], row[known], left[known], right[known], start[known], slope[known]
+
+
+def _covered(low: Array, high: Array, most: int) -> tuple[Ints, Ints]:
+    """Return the pixels, of `most` in line, whose centres lie in intervals (k,).
+
+    These are the interval and the pixel of each.
+    """
+    first = np.clip(np.ceil(low - 0.5), 0, most).astype(np.int64)
+    count = np.clip(np.floor(high - 0.5).astype(np.int64) + 1, first, most) - first
+    interval = np.repeat(np.arange(len(low)), count)
+    return interval, np.arange(len(interval)) - np.repeat(np.cumsum(count) - count - first, count)
 
 
 def in_front(points: Array, depth: Array, near: float) -> Flags:

@@ -1,4 +1,4 @@
-"""Views of surfaces for pictures: projection, and colours of parts."""
+"""Views of surfaces for pictures: projection, light, and colours of parts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import numpy as np
 from gso import geometry
 from gso.mesh.mesh import Frame, Mesh
 from gso.typing import Array
+
+GRAZING = np.array([-0.70, 0.50, 0.50])
+"""Light along the surface, which shows every bump: right, up, towards the viewer."""
 
 #: Angles about the vertical axis and above the horizon, degrees.
 _TURN, _TILT = 25.0, 48.0
@@ -77,6 +80,15 @@ def _tilted(up: Array, toward: Array, tilt: float) -> Array:
     right = np.cross(up, eye)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(eye, right), eye], axis=1)
+
+
+def lit(normals: Array, light: Array) -> Array:
+    """Return the share of the light (m,), 0 to 1, that falls on faces with normals (m, 3).
+
+    It is the same for both orientations; normals and the direction to the light have any length.
+    """
+    length = np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    return np.asarray(np.abs(normals @ light) / (length * np.linalg.norm(light)))
 
 
 def pale_colours(count: int) -> Array:

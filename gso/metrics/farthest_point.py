@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gso.geometry.vectors import cross, lengths
+from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.typing import Array, Flags, Ints
@@ -144,7 +144,7 @@ def _may_exceed_pair(bound: float, points: Array, other: Mesh, which: Ints) -> F
     two = np.flatnonzero(((which == first[:, None]) | (which == last[:, None])).all(axis=1))
     tables = [other.triangles[x[two]] for x in (first, last)]
     same = tables[0][:, :, None] == tables[1][:, None, :]
-    joined = same.any(axis=(2)).sum(axis=1) == 2
+    joined = same.any(axis=2).sum(axis=1) == 2
     two, same = two[joined], same[joined]
     if not len(two):
         return out
@@ -154,19 +154,15 @@ def _may_exceed_pair(bound: float, points: Array, other: Mesh, which: Ints) -> F
     ids = [table[own, (at + k) % 3] for k in (1, 2, 0)]
     a, b, c, d = other.vertices[np.stack([*ids, beyond[own, opposite]])]
     edge, x = b - a, points[two]
-    normals = [cross(edge, c - a), cross(d - a, edge)]
-    normals = [n / np.maximum(lengths(n), 1e-300)[:, None] for n in normals]
+    normals = [unit(cross(edge, c - a)), unit(cross(d - a, edge))]
     height = [np.abs(_dots(x - a[:, None], n)).max(axis=1) for n in normals]
     cosine = np.einsum("kd,kd->k", *normals)
     share = _dots(x - a[:, None], edge)
     inside = (share >= 0) & (share <= np.einsum("kd,kd->k", edge, edge)[:, None])
-    for tip, to in ((c, b), (c, a), (d, b), (d, a)):
+    for tip, end, inner in ((c, a, b), (c, b, a), (d, a, b), (d, b, a)):
         # The side of the edge from the tip to one end of the common edge on which the other end is.
-        end = a if to is b else b
-        way = end - tip
-        square = np.maximum(np.einsum("kd,kd->k", way, way), 1e-300)
-        off = to - tip
-        inward = off - (np.einsum("kd,kd->k", off, way) / square)[:, None] * way
+        way, off = unit(end - tip), inner - tip
+        inward = off - np.einsum("kd,kd->k", off, way)[:, None] * way
         inside &= _dots(x - tip[:, None], inward) >= 0
     most = np.maximum(*height) / np.sqrt(np.maximum(0.5 * (1.0 + cosine), 1e-300))
     out[two[(cosine > 0) & inside.all(axis=1) & (most <= bound)]] = False

@@ -20,9 +20,9 @@ from gso.components import average
 from gso.errors import OptionError
 from gso.io import as_mesh
 from gso.mesh import Mesh
-from gso.mesh.view import View
+from gso.mesh.view import GRAZING, View
 from gso.pattern import Pattern
-from gso.plot.draw import GRAZING, SUFFIXES, Panel, available, draw, facing, require, turned, write
+from gso.plot.draw import SUFFIXES, Panel, available, draw, facing, require, turned, write
 from gso.plot.heat import Heat, Scale, curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.picture_panels import gauss, pieces, ruled, strips
 from gso.result import Result

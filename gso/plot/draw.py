@@ -17,6 +17,7 @@ from gso import geometry
 from gso.errors import GSOError
 from gso.io import check_writable, replacing, suffix_of
 from gso.mesh import topology
+from gso.mesh.view import lit
 from gso.plot.heat import Heat, Scale
 from gso.typing import AnyPath, Array, Ints, Keywords
 
@@ -32,9 +33,6 @@ SUFFIXES = (".png", ".pdf", ".svg")
 
 LIGHT = np.array([-0.40, 0.45, 0.80])
 """Where the light comes from: right, up, towards the viewer."""
-
-GRAZING = np.array([-0.70, 0.50, 0.50])
-"""Light along the surface, which shows every bump."""
 
 _PLAIN = (0.60, 0.71, 0.82)
 _UNKNOWN = (0.80, 0.80, 0.80)
@@ -251,9 +249,7 @@ def _colours(panel: Panel) -> tuple[Array, ScalarMappable | None]:
 def _shading(panel: Panel, ambient: float) -> Array:
     """Compute the brightness of every face (m,), the same for both orientations."""
     normal = geometry.quad_area_vectors(panel.points, panel.corners)
-    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
-    lit = np.abs(normal @ panel.light) / (length * np.linalg.norm(panel.light))
-    return np.asarray(ambient + (1.05 - ambient) * lit)
+    return ambient + (1.05 - ambient) * lit(normal, panel.light)
 
 
 def write(figure: Figure, path: AnyPath | None) -> Figure:

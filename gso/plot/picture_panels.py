@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry
-from gso.components import split
+from gso.components import largest_first
 from gso.mesh import Mesh
-from gso.mesh.view import View, pale_colours
+from gso.mesh.view import GRAZING, View, pale_colours
 from gso.pattern import Pattern
-from gso.plot.draw import GRAZING, Panel, facing, turned
+from gso.plot.draw import Panel, facing, turned
 from gso.ruled.ruled_surface import RuledSurface
 from gso.rulings import gauss_image, shape_operator, trace
 from gso.seams.segmentation import Segmentation, whole_pattern
@@ -76,7 +76,7 @@ def part_numbers(pattern: Pattern) -> Ints:
     These are the numbers of parts in the files of ``gso fabricate``.
     """
     out = np.empty(len(pattern.faces), np.int64)
-    for number, part in enumerate(sorted(split(pattern.mesh), key=lambda part: -part.area)):
+    for number, part in enumerate(largest_first(pattern.mesh)):
         out[part.faces] = number + 1
     return out
 

@@ -44,7 +44,7 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
             "bend_radius_min": surface.rulings.smallest_radius,
         }
         | _creases(surface.creases, surface.mesh.vertices, percent)
-        | part_metrics(surface.pattern)
+        | _part_metrics(surface.pattern)
         | {"needles": float((percent * _widths(surface.mesh) < 100.0 * _NEEDLE).sum())}
     )
 
@@ -66,8 +66,20 @@ def _creases(creases: Folds, vertices: Array, percent: float) -> dict[str, float
     }
 
 
-def part_metrics(pattern: Pattern) -> dict[str, float]:
+def smallest_part(pattern: Pattern) -> float:
+    """Return the area of the smallest part of a pattern, in % of all."""
+    return _least_area(_regions(pattern))
+
+
+def _part_metrics(pattern: Pattern) -> dict[str, float]:
     """Return the size of the smallest part of a pattern."""
+    regions = _regions(pattern)
+    widths = [_inscribed(region) for region in regions]
+    return {"part_area_min": _least_area(regions), "part_circle_min": min(widths)}
+
+
+def _regions(pattern: Pattern) -> list[np.ndarray]:
+    """Return the polygons of each part; several where the pattern meets itself."""
     import shapely
 
     mesh, flat = pattern.mesh, pattern.flat
@@ -75,20 +87,29 @@ def part_metrics(pattern: Pattern) -> dict[str, float]:
     rings: list[list[Array]] = [[] for _ in range(int(label.max()) + 1)]
     for loop in mesh.boundary_loops:
         rings[label[loop[0]]].append(flat[loop])
-    areas, widths = [], []
+    out = []
     for loops in rings:
         outer, *holes = sorted(loops, key=lambda loop: -abs(signed_area(loop)))
-        # Patterns that meet themselves are no valid polygons.
-        parts = shapely.get_parts(shapely.make_valid(shapely.Polygon(outer, holes)))
-        largest = max(parts, key=shapely.area)
-        area = float(shapely.area(parts).sum())
-        areas.append(area)
-        circle = shapely.maximum_inscribed_circle(largest) if area else None
-        widths.append(0.0 if circle is None else 2.0 * shapely.length(circle))
-    return {
-        "part_area_min": 100.0 * min(areas) / max(sum(areas), 1e-300),
-        "part_circle_min": float(min(widths)),
-    }
+        out.append(shapely.get_parts(shapely.make_valid(shapely.Polygon(outer, holes))))
+    return out
+
+
+def _least_area(regions: list[np.ndarray]) -> float:
+    """Return the smallest area, in % of all."""
+    import shapely
+
+    areas = [float(shapely.area(region).sum()) for region in regions]
+    return 100.0 * min(areas) / max(sum(areas), 1e-300)
+
+
+def _inscribed(region: np.ndarray) -> float:
+    """Return the diameter of the largest circle in a part."""
+    import shapely
+
+    largest = max(region, key=shapely.area)
+    if not shapely.area(largest):
+        return 0.0
+    return 2.0 * float(shapely.length(shapely.maximum_inscribed_circle(largest)))
 
 
 def _widths(mesh: Mesh) -> Array:

@@ -13,16 +13,16 @@ import numpy as np
 from gso import geometry
 from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
-from gso.mesh.view import View, pale_colours
-from gso.typing import Array, Ints
-from gso.workshop.panels import Made, Panel
+from gso.mesh.view import GRAZING, View, lit, pale_colours
+from gso.typing import Array
+from gso.workshop.panels import Made
 
 #: Size of a picture, its margin and the height of its texts, in pixels; pixels of the image of
 #: the faces per pixel; points of a line at which it is looked for behind others, and their
 #: distance from faces.
 _SIZE, _MARGIN, _TALL, _FINE, _POINTS, _NEAR = 470, 12, 14, 2, 9, 3.0
-#: Lowest brightness, and the direction to the light.
-_DARK, _LIGHT = 0.45, np.array([-0.70, 0.50, 0.50])
+#: Lowest brightness.
+_DARK = 0.45
 
 
 def assembly(made: Made, link: Callable[[str], str]) -> list[str]:
@@ -77,10 +77,11 @@ def _drawn(view: View, made: Made, link: Callable[[str], str]) -> str:
     page.root.attrib |= {"width": width, "height": height}
     source = f"data:image/png;base64,{base64.b64encode(_png(image)).decode()}"
     SubElement(page.root, "image", {"href": source, "width": width, "height": height})
-    for kind, edges in (("bend", lambda panel: panel.bends), ("rim", _rim)):
+    bends, rims = ([getattr(panel, name) for panel in made.panels] for name in ("bends", "rim"))
+    for kind, edges in (("bend", bends), ("rim", rims)):
         drawn = [
-            _seen_parts(own[edges(panel)], turn[edges(panel)], depth)
-            for panel, own, turn in zip(made.panels, placed, turned, strict=True)
+            _seen_parts(own[ends], turn[ends], depth)
+            for ends, own, turn in zip(edges, placed, turned, strict=True)
         ]
         page.path(page.root, np.concatenate(drawn), kind=kind)
     for number, middle in geometry.roomiest_pixels(np.where(shown, owner[triangle], -1)).items():
@@ -102,10 +103,6 @@ def _short(name: str, design: str) -> str:
     return name.removeprefix(f"{design}-") or name
 
 
-def _rim(panel: Panel) -> Ints:
-    return np.concatenate([np.stack([x, np.roll(x, -1)], axis=1) for x in panel.loops])
-
-
 def _seen_parts(lines: Array, turned: Array, depth: Array) -> Array:
     """Return the parts (k, 2, 2) of lines (l, 2, 3) that are not hidden."""
     share = np.linspace(0.0, 1.0, _POINTS)[:, None]
@@ -124,10 +121,7 @@ def _tones(corners: Array, colours: Array) -> np.ndarray:
     """Return the colours of triangles, the same for both orientations, (m, 3)."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # Rows of the image count downwards.
-    normal *= [1.0, -1.0, 1.0]
-    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
-    lit = np.abs(normal @ _LIGHT) / (length * np.linalg.norm(_LIGHT))
-    bright = _DARK + (1.0 - _DARK) * lit
+    bright = _DARK + (1.0 - _DARK) * lit(normal * [1.0, -1.0, 1.0], GRAZING)
     return np.asarray(np.round(255.0 * colours * bright[:, None]).astype(np.uint8))
 
 

@@ -108,7 +108,7 @@ def part_record(panel: Panel, part: Part) -> Json:
         "bends": len(part.bends),
         "bend_angle_max": float(angles.max(initial=0.0)),
         "bend_radius_min": float(panel.radii.min(initial=np.inf)),
-        "curved": not len(panel.bends) and is_curved(panel),
+        "curved": bool(part.guides) or (not len(panel.bends) and is_curved(panel)),
         "guide_lines": len(part.guides),
         "guide_angle_max": float(np.degrees(max((g.angle for g in part.guides), default=0.0))),
         "zones": [

@@ -101,8 +101,7 @@ def _moved(side: Side, first: int) -> Side:
 
 def _rim(panel: Panel, seams: Sequence[Side]) -> Ints:
     """Return the edges of a panel's outline that are no seam."""
-    count = len(panel.flat)
-    rim = np.concatenate([np.stack([x, np.roll(x, -1)], axis=1) for x in panel.loops])
+    count, rim = len(panel.flat), panel.rim
     known = [np.empty(0, np.int64)]
     for side in seams:
         ends = side.edges[:, 0]

@@ -85,6 +85,11 @@ class Panel:
         size = [float(np.ptp(self.flat[loop], axis=0).prod()) for loop in loops]
         return [loops[k] for k in np.argsort([-s for s in size], kind="stable")]
 
+    @property
+    def rim(self) -> Ints:
+        """Edges of the boundary loops, (e, 2)."""
+        return np.concatenate([np.stack([x, np.roll(x, -1)], axis=1) for x in self.loops])
+
 
 @dataclass(frozen=True, eq=False)
 class Side:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso.components import split
+from gso.components import largest_first
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.topology import pair_keys
@@ -106,7 +106,7 @@ def _divided(
     made_of: tuple[Ints, Sequence[tuple[str, ...]]] | None = None,
 ) -> tuple[list[Panel], Ints, Ints]:
     """Return the panels of a pattern, and the panel and the number in it of each vertex."""
-    parts = sorted(split(pattern.mesh), key=lambda part: -part.area)
+    parts = largest_first(pattern.mesh)
     label, local = (np.full(len(pattern.flat), -1) for _ in range(2))
     for number, part in enumerate(parts):
         label[part.vertices], local[part.vertices] = number, np.arange(len(part.vertices))
@@ -130,10 +130,7 @@ def _rims(panels: list[Panel], pattern: Pattern, label: Ints, local: Ints) -> li
     ends = pattern.seams.reshape(-1, 2)
     out = []
     for number, panel in enumerate(panels):
-        n = len(panel.flat)
-        rim = np.concatenate(
-            [np.stack([loop, np.roll(loop, -1)], axis=1) for loop in panel.surface.boundary_loops]
-        )
+        n, rim = len(panel.flat), panel.rim
         own = pair_keys(local[ends[label[ends[:, 0]] == number]], n)
         keys = pair_keys(rim, n)
         out.append(rim[~np.isin(keys, own)])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gso.result import Result, StripsResult
-from gso.ruled.strip_metrics import part_metrics
+from gso.ruled.strip_metrics import smallest_part
 from gso.typing import Array
 from gso.wording import length
 
@@ -45,7 +45,7 @@ def shop_notes(result: Result) -> tuple[str, ...]:
     if not isinstance(result, StripsResult) or result.ruled.strain is not None:
         return ()
     rulings, steep = result.ruled.rulings, float(np.degrees(result.ruled.creases.largest_angle))
-    small = part_metrics(result.ruled.pattern)["part_area_min"]
+    small = smallest_part(result.ruled.pattern)
     return said(rulings.angles, rulings.radii, result.design.size, steep, small)
 
 
