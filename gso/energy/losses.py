@@ -69,3 +69,25 @@ class Distance:
     def weights(self, r: B) -> tuple[B, B]:
         w = self.eps / self._root(r)
         return r * w, ops.like(r, w)
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """Half the square of the excess of ``|r|`` over a limit, zero below it.
+
+    It is isotropic, as :class:`Distance` is, and its curvature is that of the excess along r.
+    """
+
+    limit: float
+
+    def _share(self, r: B) -> B:
+        length = ops.sqrt((r * r).sum(0)[None] + 1e-300)
+        return ops.maximum(1.0 - self.limit / length, 0.0)
+
+    def value(self, r: B) -> B:
+        length = ops.sqrt((r * r).sum(0)[None] + 1e-300)
+        return 0.5 * (length * self._share(r)) ** 2
+
+    def weights(self, r: B) -> tuple[B, B]:
+        share = self._share(r)
+        return r * share, ops.like(r, ops.where(share > 0.0, 0.0 * share + 1.0, 0.0))

@@ -28,7 +28,7 @@ def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     return tuple(t * a + along * b for a, b in zip(u, n, strict=True))
 
 
-def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
+def build(mesh: Mesh, normals: Array, *, tangential: float | Array = 1.0) -> Term:
     """Build the proximity of every vertex to its position in `mesh`.
 
     Parameters
@@ -37,11 +37,12 @@ def build(mesh: Mesh, normals: Array, *, tangential: float = 1.0) -> Term:
         Reference surface.
     normals : ndarray, (n, 3)
         Unit normals at its vertices.
-    tangential : float
+    tangential : float or ndarray, (n,)
         Factor on the tangential part of the displacement.
     """
     n = len(mesh.vertices)
-    constants = np.concatenate([mesh.vertices.T, normals.T, np.full((1, n), tangential)])
+    factor = np.broadcast_to(np.asarray(tangential, float), n)[None]
+    constants = np.concatenate([mesh.vertices.T, normals.T, factor])
     return Term(
         "proximity",
         residual,

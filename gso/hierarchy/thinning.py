@@ -42,16 +42,25 @@ class Thinned(NamedTuple):
         Its vertices among those of the finer mesh, in increasing order.
     faces : ndarray of int, (t, 3)
         Its triangles, in its own numbering.
+    lines : ndarray of int, (k, 2)
+        What is left of the given lines, in its own numbering.
     """
 
     ids: Ints
     faces: Ints
+    lines: Ints
 
 
-def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None) -> Thinned:
+def thinned(
+    points: Array,
+    triangles: Ints,
+    count: int,
+    keep: Ints | None = None,
+    lines: Ints | None = None,
+) -> Thinned:
     """Remove vertices of a triangle mesh until about `count` remain.
 
-    Boundary vertices are removed along the boundary only; its corners stay. More than `count`
+    Boundary vertices are removed along the boundary only; its corners stay. So are those of lines. More than `count`
     vertices remain where no other one can be removed without folding a triangle.
 
     Parameters
@@ -64,6 +73,8 @@ def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None
         Number of vertices to reach.
     keep : ndarray of int, optional
         Vertices that are not removed.
+    lines : ndarray of int, (k, 2), optional
+        Edges that form lines, such as creases. Their ends and junctions stay.
 
     Examples
     --------
@@ -78,6 +89,9 @@ def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None
     faces = faces.reshape(-1, 3).astype(np.int64)
     held = np.zeros(len(points), bool)
     held[[] if keep is None else keep] = True
+    left_lines = np.empty((0, 2), np.int64)
+    if lines is not None and len(lines):
+        left_lines = np.searchsorted(ids, np.asarray(lines, np.int64))
     # A fixed seed: the same mesh has the same coarser meshes.
     order = np.random.default_rng(0).permutation(len(points))
     least = _SHAPE
@@ -85,7 +99,9 @@ def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None
         surplus = len(ids) - count
         if surplus <= 0:
             break
-        into = _collapsed(points[ids], faces, order[ids], held[ids], surplus, least)
+        guides = _guides(left_lines, len(ids))
+        stay = held[ids] | guides.fixed
+        into = _collapsed(points[ids], faces, order[ids], stay, surplus, least, guides)
         left = into == np.arange(len(ids))
         removed = len(ids) - int(left.sum())
         if removed < _FEW * min(surplus, len(ids)):
@@ -96,15 +112,20 @@ def thinned(points: Array, triangles: Ints, count: int, keep: Ints | None = None
         whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
         number = np.cumsum(left) - 1
         faces, ids = number[faces[whole]], ids[left]
-        faces = flipped(points[ids], faces)
-    return Thinned(ids, faces)
+        if len(left_lines):
+            left_lines = number[into[left_lines]]
+            left_lines = np.unique(np.sort(left_lines, axis=1), axis=0)
+            left_lines = left_lines[left_lines[:, 0] != left_lines[:, 1]]
+        faces = flipped(points[ids], faces, left_lines)
+    return Thinned(ids, faces, left_lines)
 
 
-def flipped(points: Array, faces: Ints) -> Ints:
+def flipped(points: Array, faces: Ints, keep: Ints | None = None) -> Ints:
     """Flip edges of a triangle mesh towards a Delaunay triangulation, in one pass.
 
     An edge is flipped where its opposite angles sum to more than 180 degrees, unless the new
-    triangles would turn away from the old ones. No triangle takes part in two flips.
+    triangles would turn away from the old ones, or it is to be kept (k, 2). No triangle takes part
+    in two flips.
     """
     n, count = len(points), len(faces)
     origin, dest, apex = (np.roll(faces, -k, axis=1).ravel() for k in range(3))
@@ -124,6 +145,8 @@ def flipped(points: Array, faces: Ints) -> Ints:
     lengths = _dot(q - p, q - p)
     (wanted,) = np.nonzero(excess > 1e-6 * lengths**2)
     wanted = wanted[(c != d)[wanted]]
+    if keep is not None and len(keep):
+        wanted = wanted[~np.isin(key[one[wanted]], edge_keys(keep[:, 0], keep[:, 1], n))]
     p, q, r, s = (x[wanted] for x in (p, q, r, s))
     normal = left[wanted] + right[wanted]
     turned = [_cross(p - r, s - r), _cross(q - s, r - s)]
@@ -150,6 +173,33 @@ def flipped(points: Array, faces: Ints) -> Ints:
     out[one[wanted] // 3] = np.stack([c, a, d], axis=1)
     out[two[wanted] // 3] = np.stack([d, b, c], axis=1)
     return out
+
+
+class _Guides(NamedTuple):
+    """The lines along which vertices may be removed.
+
+    Attributes
+    ----------
+    before, after : ndarray of int, (n,)
+        Neighbours on a line, -1 for vertices on none.
+    fixed : ndarray of bool, (n,)
+        Ends and junctions of lines.
+    """
+
+    before: Ints
+    after: Ints
+    fixed: Flags
+
+
+def _guides(lines: Ints, n: int) -> _Guides:
+    number = np.bincount(lines.ravel(), minlength=n)
+    before, after = np.full(n, -1), np.full(n, -1)
+    ends = np.concatenate([lines, lines[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    inner = ends[number[ends[:, 0]] == 2]
+    before[inner[::2, 0]] = inner[::2, 1]
+    after[inner[1::2, 0]] = inner[1::2, 1]
+    return _Guides(before, after, (number > 0) & (number != 2))
 
 
 class _Links(NamedTuple):
@@ -196,18 +246,27 @@ def _among(sorted_keys: Ints, keys: Ints) -> Flags:
 
 
 def _collapsed(
-    points: Array, faces: Ints, order: Ints, held: Flags, most: int, least: float
+    points: Array,
+    faces: Ints,
+    order: Ints,
+    held: Flags,
+    most: int,
+    least: float,
+    guides: _Guides,
 ) -> Ints:
     """Return the vertex (n,) that each one is collapsed into; itself where it stays."""
     n = len(points)
     links = _links(faces, n)
     into = np.arange(n)
     border = links.open_out >= 0
-    may = ~held & (np.diff(links.start) > 1) & (~border | _straight(points, links, border))
+    may = ~held & (np.diff(links.start) > 1)
+    may &= ~border | _straight(points, links.open_in, links.open_out, border)
+    guided = guides.before >= 0
+    may &= ~guided | (_straight(points, guides.before, guides.after, guided) & ~border)
     centre = np.flatnonzero(_independent(links, order, may, n))
     if not len(centre):
         return into
-    centre, target, shape = _best_targets(points, links, centre, border, least)
+    centre, target, shape = _best_targets(points, links, centre, border, least, guides)
     centre, target, shape = _safe(links, centre, target, shape, border, n)
     if len(centre) > most:
         first = np.argsort(-shape, kind="stable")[:most]
@@ -216,13 +275,13 @@ def _collapsed(
     return into
 
 
-def _straight(points: Array, links: _Links, border: Flags) -> Flags:
-    """Return at which vertices the boundary does not turn."""
-    before = points - points[links.open_in]
-    after = points[links.open_out] - points
+def _straight(points: Array, previous: Ints, following: Ints, on: Flags) -> Flags:
+    """Return at which vertices a line through them does not turn."""
+    before = points - points[previous]
+    after = points[following] - points
     along = np.einsum("nd,nd->n", before, after)
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return np.asarray(border & (along > _STRAIGHT * sizes))
+    return np.asarray(on & (along > _STRAIGHT * sizes))
 
 
 def _independent(links: _Links, order: Ints, may: Flags, n: int) -> Flags:
@@ -245,7 +304,7 @@ def _independent(links: _Links, order: Ints, may: Flags, n: int) -> Flags:
 
 
 def _best_targets(
-    points: Array, links: _Links, centre: Ints, border: Flags, least: float
+    points: Array, links: _Links, centre: Ints, border: Flags, least: float, guides: _Guides
 ) -> tuple[Ints, Ints, Array]:
     """Return vertices that can be removed, their best target, and the worst new shape there."""
     degree = np.diff(links.start)[centre]
@@ -261,6 +320,11 @@ def _best_targets(
         # Along the boundary only.
         v = centre[which]
         allowed = ~border[v] | (target == links.open_out[v]) | (target == links.open_in[v])
+        which, target = which[allowed], target[allowed]
+    if (guides.before[centre] >= 0).any():
+        v = centre[which]
+        allowed = (target == guides.before[v]) | (target == guides.after[v])
+        allowed |= guides.before[v] < 0
         which, target = which[allowed], target[allowed]
     count = degree[which]
     pair = np.repeat(np.arange(len(which)), count)

@@ -62,13 +62,18 @@ def divided(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
     """
     if not len(edges):
         return mesh, np.empty((0, 2), np.int64)
+    return parts_of(mesh, edges, shares)[0], edges
+
+
+def parts_of(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
+    """Insert vertices as :func:`divided` does; return the face that each one is a part of, too."""
     v = mesh.vertices
     points = v[edges[:, 0]] + shares[:, None] * (v[edges[:, 1]] - v[edges[:, 0]])
     faces, owner = subdivided(mesh.faces[:, :3], len(v), edges)
     said = mesh.attributes
     if said is not None:
         said = replace(said, texture=None, texture_corners=None).taken(owner)
-    return Mesh(np.concatenate([v, points]), faces, attributes=said), edges
+    return Mesh(np.concatenate([v, points]), faces, attributes=said), owner
 
 
 def subdivided(f: Ints, n: int, edges: Ints) -> tuple[Ints, Ints]:

@@ -85,7 +85,7 @@ def with_darts(ground: Ground, strain: float, neck: float, *, firm: bool) -> Pie
         edges = cut_tree(ground, strain, share * neck)
         if share == 0.0 or _largest(ground, edges) <= (1.0 + _EXCESS) * strain:
             break
-    return _disks(ground, edges)
+    return disks(ground, edges)
 
 
 def without_darts(ground: Ground, strain: float) -> list[Merging]:
@@ -108,7 +108,7 @@ def merged_value(merging: Merging, settings: PieceSettings) -> tuple[int, float,
 def pieces_of(merging: Merging) -> Pieces:
     """Cut between merged pieces, along straightened seams."""
     label = straightened(merging.ground, merging)
-    return _disks(merging.ground, merging.edges(label))
+    return disks(merging.ground, merging.edges(label))
 
 
 def _small(ground: Ground, strain: float, count: int) -> Ints:
@@ -132,7 +132,7 @@ def _largest(ground: Ground, edges: Ints) -> float:
     return 0.5 * float(np.abs(ground.potential.solve(reached)).max())
 
 
-def _disks(ground: Ground, edges: Ints) -> Pieces:
+def disks(ground: Ground, edges: Ints) -> Pieces:
     """Cut a design along edges, and along more of them where a piece is no disk."""
     pieces = cut(ground.mesh, Edges(edges))
     more = [
@@ -208,7 +208,7 @@ def measured(
                 more.append(ground.mirrored(piece.vertices[edges]))
         if not more:
             break
-        pieces = _disks(ground, np.concatenate([pieces.edges, *more]))
+        pieces = disks(ground, np.concatenate([pieces.edges, *more]))
     return Candidate(pieces, tuple(sheets))
 
 

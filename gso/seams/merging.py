@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 
 import numpy as np
 
@@ -23,10 +24,22 @@ class Merging:
         Bound on the estimated strain of a piece.
     compact : float
         How much more a merge counts that removes much of a boundary.
+    estimate : callable, optional
+        What the bound is on instead of the strain: it takes faces, and returns None where they are
+        no disk.
     """
 
-    def __init__(self, ground: Ground, label: Ints, strain: float, compact: float):
+    def __init__(
+        self,
+        ground: Ground,
+        label: Ints,
+        strain: float,
+        compact: float,
+        estimate: Callable[[Ints], float | None] | None = None,
+    ):
         mesh = ground.mesh
+        #: Estimates the strain of some faces together; None where they are no disk.
+        self.estimate = estimate or ground.estimates
         self.ground, self.strain, self.compact = ground, strain, compact
         self.label: Ints = label.astype(np.int64).copy()
         he = mesh.half_edges
@@ -126,7 +139,3 @@ class Merging:
         sides = (self.label if label is None else label)[self._sides]
         cut = self._ends[(sides[:, 0] != sides[:, 1]) | self._kept]
         return np.unique(np.sort(cut, axis=1), axis=0)
-
-    def estimate(self, faces: Ints) -> float | None:
-        """Estimate the strain of some faces together; None where they are no disk."""
-        return self.ground.estimates(faces)

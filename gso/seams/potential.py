@@ -40,6 +40,8 @@ class Potential:
         Area of each vertex: a third of its triangles.
     curvature : ndarray, (n,)
         Angle defect of each vertex, in radians; not to be used on the boundary.
+    stiffness : csr_matrix, (n, n)
+        Cotangent weights: minus the integrated Laplacian.
 
     Examples
     --------
@@ -67,7 +69,7 @@ class Potential:
         a, b = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()
         w = weight.ravel()
         rows, columns = np.r_[a, b, a, b], np.r_[b, a, a, b]
-        self._stiffness = coo_matrix(
+        self.stiffness = coo_matrix(
             (np.r_[-w, -w, w, w], (rows, columns)), shape=(count, count)
         ).tocsr()
 
@@ -88,7 +90,7 @@ class Potential:
         if within is not None:
             free = free[~fixed[free]]
         if free.size:
-            own = self._stiffness[free][:, free]
+            own = self.stiffness[free][:, free]
             out[free] = -spd(own)(self.curvature[free])
         return out
 
@@ -99,7 +101,7 @@ class Potential:
         mass = np.maximum(self.area, 1e-9 * size)
         step = 0.5 * edges**2 * size
         system = coo_matrix((mass, (np.arange(n), np.arange(n))), shape=(n, n)) + (
-            step * self._stiffness
+            step * self.stiffness
         )
         return np.asarray(mass * spd(system)(self.curvature))
 

@@ -16,6 +16,7 @@ from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
 from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.joint_solve import solve_pieces
 from gso.seams.options import PieceSettings
+from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
 from gso.seams.tree import Ground
 from gso.tasks.developable import Options
@@ -53,6 +54,10 @@ class _Attempt:
 def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result | None]:
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
+    scaled = ground.mesh.is_triangles and not settings.darts and ground.mirror is None
+    if scaled and ground.factor is None:
+        trial = divided_within(ground.mesh, settings, ground.kept)
+        return _patterns(ground, trial.shape, settings), trial.result
     tried: list[_Attempt] = []
     for level in _levels(tried, len(ground.kept)):
         settings.say(f"seams and shape, attempt {len(tried) + 1}")
@@ -68,12 +73,16 @@ def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result
         ),
     )
     best = _with_straight_seams(ground, best, settings, allowed)
-    shape = best.pieces
+    return _patterns(ground, best.pieces, settings), best.result
+
+
+def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:
+    """Lay the solved pieces flat; with darts, join them where the strain allows it."""
     surface = ground.moved(shape.design)
     found = measured(surface, shape, settings.max_size, settings.say, executor=settings.executor)
     if settings.darts and found.strain <= settings.max_strain:
         found = joined(surface, found, settings.max_strain, neck_of(ground, settings), settings)
-    return found, best.result
+    return found
 
 
 def _with_straight_seams(

@@ -24,16 +24,17 @@ import numpy as np
 
 from gso import metrics as measure
 from gso.components import several
-from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, holonomy, proximity
-from gso.energy.losses import Absolute, Distance
+from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, holonomy, proximity, reach
+from gso.energy.losses import Absolute, Beyond, Distance
+from gso.geometry import area_vectors
 from gso.hierarchy import resample
-from gso.mesh import Mesh
+from gso.mesh import Mesh, Nearest
 from gso.mesh.normals import vertex_normals
 from gso.tasks import per_component
 from gso.tasks.developable.analysis import Analysis, Shape, own_bending
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
-from gso.typing import Array, Ints, N
+from gso.typing import Array, Flags, Ints, N
 
 #: Mean |K| and mean squared bending of a typical design, for which weights are quoted.
 TYPICAL_CURVATURE = 0.3
@@ -50,6 +51,11 @@ BOUNDED = (4.5, 3.0, 0.3)
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
+#: Radii of balls over the reach, the distance of their centres from the surface over the radius from
+#: which on they count as empty, the reach over the radius, the least reach of a vertex, and the
+#: cosine of the angle between normals of both sides.
+_RADII, _EMPTY, _OF_RADIUS, _THINNEST = (0.5, 1.0, 1.5, 2.0), 0.85, 0.5, 0.2
+_OPPOSITE = -0.5
 #: Defect in degrees up to which an inner outline counts as a hole, as where patterns are cut open;
 #: others are the ends of tubes. And the defect up to which a hole lacks no angle.
 _HOLE, _LACKS = 90.0, 0.1
@@ -124,8 +130,41 @@ def _terms(
     fair = fairness.build(mesh, reference=smooth.vertices, share=share)
     items.append(Weighted(fair, w_fairness))
     items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
+    if o.reach is not None:
+        limits = _limits(mesh, normals, o.reach)
+        far = reach.build(mesh, normals, limits, tangential=_rim(mesh).astype(float))
+        items.append(Weighted(far, o.w_reach, Beyond(1.0)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
+
+
+def _limits(mesh: Mesh, normals: Array, most: float) -> Array:
+    """Return how far each vertex (n,) may move: less where the surface is thin, as at rods.
+
+    There a ball that touches the surface at the vertex contains points of the other side.
+    """
+    near, out = Nearest(mesh), np.full(len(mesh.vertices), _THINNEST)
+    facing = area_vectors(mesh.vertices, mesh.triangles)
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    for radius in _RADII:
+        empty = np.ones(len(out), bool)
+        for side in (-radius, radius):
+            triangle, away = near.nearest(mesh.vertices + side * most * normals)
+            other = np.einsum("nd,nd->n", facing[triangle], normals) < _OPPOSITE
+            empty &= (away >= _EMPTY * radius * most) | ~other
+        out = np.maximum(out, np.where(empty, _OF_RADIUS * radius, 0.0))
+    return most * np.minimum(out, 1.0)
+
+
+def _rim(mesh: Mesh) -> Flags:
+    """Mark the boundary vertices (n,) that are on no seam: no other one is at the same place."""
+    on = np.flatnonzero(mesh.half_edges.boundary_vertex)
+    _, place, often = np.unique(
+        mesh.vertices[on], axis=0, return_inverse=True, return_counts=True
+    )
+    rim = np.zeros(len(mesh.vertices), bool)
+    rim[on] = often[place.reshape(-1)] == 1
+    return rim
 
 
 def _holes(mesh: Mesh) -> list[Ints]:

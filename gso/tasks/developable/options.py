@@ -36,6 +36,11 @@ class Options(BaseOptions):
         weight used decreases with the design's bending.
     w_proximity : float
         Weight of the displacement from the design.
+    reach : float, optional
+        Displacements along normals, and any of the boundary without seams, are penalised beyond this by the
+        square of the excess; in the design's unit.
+    w_reach : float
+        Weight of that.
     w_elongation : float
         Weight of edges much shorter or longer than in the design. Boundary edges are penalised
         from a change of length of 8 % on.
@@ -107,6 +112,8 @@ class Options(BaseOptions):
     w_holes: float = 0.15
     w_fairness: float = 7.8e-6
     w_proximity: float = 1.0
+    reach: float | None = None
+    w_reach: float = 100.0
     w_elongation: float = 0.1
     quadratic_below: float = 0.006
     tangential: float = 0.5
@@ -121,6 +128,9 @@ class Options(BaseOptions):
     coarse_vertices: int = 10_000
     by_component: bool = True
     developable_below: float = 1e-3
+
+    def in_unit(self, unit: float) -> Options:
+        return self if self.reach is None else replace(self, reach=self.reach / unit)
 
     def for_pieces(self) -> Options:
         """Return settings with more fairness: seams take up what single surfaces need creases for.

@@ -1,0 +1,144 @@
+"""A copy of a design at the scale of an allowed distance, on which seams are searched for.
+
+Everything finer than the distance is noise to the search. The copy is smoothed within a share of
+the distance, then thinned to triangles of about that size, so that the work depends on the distance
+and not on the file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import diags
+
+from gso import metrics
+from gso.hierarchy.thinning import flipped, thinned
+from gso.linalg import spd
+from gso.mesh import Mesh
+from gso.mesh.slicing import divided
+from gso.seams.crease_lines import crease_lines
+from gso.seams.distance_estimate import largest_curvatures
+from gso.seams.potential import Potential
+from gso.typing import Ints
+
+#: Share of the distance that smoothing may use.
+_SMOOTH = 0.3
+#: Edge of the copy over the distance, and least and most vertices of a copy.
+_EDGE, _FEWEST, _MOST = 1.15, 700, 2200
+#: Factor on the number of vertices where the surface is round, and the curvature over that of a
+#: ball of the distance from which on it is.
+_FINE, _ROUND = 3, 0.4
+#: Length of a crease over the distance from which on seams prefer it.
+_CREASE = 8.0
+#: Edges longer than this, over those of the copy, are divided.
+_LONG = 1.6
+#: Angle in degrees above which an edge is not flipped after that, since the shape stays.
+_BENT = 0.5
+#: Width of the smoothing over the distance.
+_WIDTH = 0.5
+#: Factor on the weight of the position of vertices on creases.
+_HELD = 1e4
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseCopy:
+    """A design with a coarse copy of it.
+
+    Attributes
+    ----------
+    base : Mesh
+        The design in triangles; long edges are divided.
+    smooth : Mesh
+        The base with smoothed vertices.
+    creases : ndarray of int, (k, 2)
+        Edges of the base on creases.
+    mesh : Mesh
+        The copy: a coarser mesh of some vertices of the smooth one.
+    ids : ndarray of int, (n,)
+        For each vertex of the copy, that of the base.
+    lines : ndarray of int, (l, 2)
+        Edges of the copy on creases.
+    """
+
+    base: Mesh
+    smooth: Mesh
+    creases: Ints
+    mesh: Mesh
+    ids: Ints
+    lines: Ints
+
+
+def coarse_copy(design: Mesh, distance: float, kept: Ints | None = None) -> CoarseCopy:
+    """Make the copy of a design for an allowed distance.
+
+    Parameters
+    ----------
+    design : Mesh
+    distance : float
+    kept : ndarray of int, (k, 2), optional
+        Edges that count as creases.
+
+    Examples
+    --------
+    >>> y, x = np.mgrid[0:1:60j, 0:1:60j]
+    >>> sheet = Mesh.from_grid(np.dstack([x, y, 0.2 * x * y]))
+    >>> copy = coarse_copy(sheet, 0.05)
+    >>> len(copy.mesh.vertices) < 0.5 * len(sheet.vertices), len(copy.lines)
+    (True, 0)
+    """
+    triangles = Mesh(design.vertices, design.triangles, attributes=design.attributes)
+    area = metrics.area(triangles)
+    count = int(np.clip(area / (0.866 * (_EDGE * distance) ** 2), _FEWEST, _MOST))
+    step = float(np.sqrt(area / (0.866 * count)))
+    base = with_short_edges(triangles, _LONG * step)
+    creases = crease_lines(base, _CREASE * distance)
+    if kept is not None and len(kept):
+        creases = np.unique(np.sort(np.concatenate([creases, kept]), axis=1), axis=0)
+    smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
+    thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
+    fine = Mesh(smooth.vertices[thin.ids], thin.faces)
+    own = thinned(fine.vertices, fine.faces, count, _narrow(fine, distance), thin.lines)
+    mesh, ids = Mesh(fine.vertices[own.ids], own.faces), thin.ids[own.ids]
+    return CoarseCopy(base, smooth, creases, mesh, ids, own.lines)
+
+
+def _narrow(mesh: Mesh, distance: float) -> Ints:
+    """Return the vertices where the surface is so round that coarser triangles would cut it."""
+    bent = largest_curvatures(mesh) * distance > _ROUND
+    return np.unique(mesh.faces[bent])
+
+
+def with_short_edges(mesh: Mesh, longest: float) -> Mesh:
+    """Divide the edges of a triangle mesh that are longer than a length; the shape stays."""
+    if mesh.edge_lengths.max(initial=0.0) <= longest:
+        return mesh
+    for _ in range(20):
+        long = mesh.edge_lengths > longest
+        if not long.any():
+            break
+        mesh, _ = divided(mesh, mesh.edges[long], np.full(int(long.sum()), 0.5))
+        he = mesh.half_edges
+        k = he.interior[metrics.dihedral_angles(mesh) > _BENT]
+        bent = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1)
+        faces = flipped(mesh.vertices, mesh.faces, bent)
+        mesh = Mesh(mesh.vertices, faces)
+    return mesh
+
+
+def smoothed_within(mesh: Mesh, width: float, distance: float, held: Ints) -> Mesh:
+    """Smooth a triangle mesh over a width; no vertex moves farther than a distance.
+
+    It minimises the displacement and the squared Laplacian of the coordinates; vertices on the held
+    edges (k, 2) stay.
+    """
+    field = Potential(mesh)
+    area = np.maximum(field.area, 1e-9 * float(field.area.mean()))
+    bending = field.stiffness @ diags(1.0 / area) @ field.stiffness
+    weight = np.where(np.isin(np.arange(len(area)), held), _HELD, 1.0) * area
+    solve = spd(diags(weight) + width**4 * bending)
+    moved = np.stack([solve(weight * x) for x in mesh.vertices.T], axis=1) - mesh.vertices
+    size = np.linalg.norm(moved, axis=1, keepdims=True)
+    moved *= np.minimum(1.0, distance / np.maximum(size, 1e-300))
+    moved[~mesh.used] = 0.0
+    return mesh.replaced(mesh.vertices + moved)

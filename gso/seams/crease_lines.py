@@ -1,0 +1,49 @@
+"""Creases of a design that are long enough to be meant: lines that seams prefer."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from gso import metrics
+from gso.mesh import Mesh
+from gso.mesh.topology import edge_graph
+from gso.typing import Ints
+
+#: Angle between faces, in degrees, from which on an edge is a crease.
+_ANGLE = 35.0
+#: Share of the length of all edges from which on creases are the facets of a coarse mesh, or noise.
+_MOST = 0.15
+
+
+def crease_lines(mesh: Mesh, shortest: float) -> Ints:
+    """Return the edges (k, 2) of creases; none where they are noise or facets.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    shortest : float
+        Length that the edges of a connected crease have together at least.
+
+    Examples
+    --------
+    >>> y, x = np.mgrid[:3.0, :5.0]
+    >>> roof = Mesh.from_grid(np.dstack([x, y, -np.abs(x - 2.0)]))
+    >>> crease_lines(Mesh(roof.vertices, roof.triangles), 1.0).tolist()
+    [[2, 7], [7, 12]]
+    """
+    he, none = mesh.half_edges, np.empty((0, 2), np.int64)
+    k = he.interior
+    sharp = k[metrics.dihedral_angles(mesh) > _ANGLE]
+    ends = np.sort(np.stack([he.origin[sharp], he.dest[sharp]], axis=1), axis=1)
+    if not len(ends):
+        return none
+    points = mesh.vertices
+    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    whole = float(np.linalg.norm(points[he.origin[k]] - points[he.dest[k]], axis=1).sum())
+    if length.sum() > _MOST * whole:
+        return none
+    graph = edge_graph(len(points), ends[:, 0], ends[:, 1])
+    label = connected_components(graph, directed=False)[1][ends[:, 0]]
+    long = np.bincount(label, length)[label] >= shortest
+    return np.asarray(ends[long][np.lexsort(ends[long].T[::-1])])

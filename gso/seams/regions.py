@@ -1,0 +1,277 @@
+"""Regions of a surface with fair boundaries, and cuts along them through triangles.
+
+The indicator functions of the regions are diffused, and each point goes to the region whose
+function is largest there. A boundary becomes shorter and straighter at the scale of the diffusion;
+three regions meet at about equal angles, and necks that are narrower disappear. Little diffuses
+across creases, so that boundaries stay on them.
+
+Source: Merriman, Bence and Osher 1992, Diffusion generated motion by mean curvature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix, diags
+
+from gso import geometry
+from gso.linalg import spd
+from gso.mesh import Cut, Mesh
+from gso.mesh.cut import cut
+from gso.mesh.slicing import parts_of
+from gso.mesh.topology import edge_keys, label_components, pair_keys
+from gso.seams.potential import Potential
+from gso.typing import Array, Flags, Ints
+
+#: Conductance across creases, relative to that of a strip as wide as an edge is long.
+_ACROSS = 0.05
+#: Shares of an edge next to its ends in which a boundary goes through the end.
+_SNAP = 0.2
+#: Cosine between normals, and smallest angle in radians, of triangles of a flipped edge.
+_ALIKE, _THIN = 0.7, 0.12
+#: Rounds in which fragments of regions go to their neighbours.
+_ROUNDS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """Diffusion on a triangle mesh with creases.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    creases : ndarray of int, (k, 2)
+    """
+
+    mesh: Mesh
+    creases: Ints
+
+    @cached_property
+    def opened(self) -> Cut:
+        """The mesh cut open along the creases."""
+        return cut(self.mesh, self.creases)
+
+    @cached_property
+    def potential(self) -> Potential:
+        """Areas and stiffness of the opened mesh."""
+        return Potential(self.opened.mesh)
+
+    @cached_property
+    def face_area(self) -> Array:
+        """Area of each face (m,)."""
+        mesh = self.mesh
+        vectors = geometry.area_vectors(mesh.vertices, mesh.faces)
+        return 0.5 * np.linalg.norm(vectors, axis=1)
+
+    @cached_property
+    def _stiffness(self) -> csr_matrix:
+        pairs = self.opened.seams.transpose(0, 2, 1).reshape(-1, 2)
+        if not len(pairs):
+            return self.potential.stiffness
+        i, j = pairs.T
+        w = np.full(len(pairs), 0.5 * _ACROSS)
+        n = len(self.opened.vertex)
+        links = coo_matrix(
+            (np.r_[w, w, -w, -w], (np.r_[i, j, i, j], np.r_[i, j, j, i])), shape=(n, n)
+        )
+        return self.potential.stiffness + links
+
+    def diffused(self, masses: Array, width: float) -> Array:
+        """Diffuse masses (p, k) at the vertices of the opened mesh over a width."""
+        area = self.potential.area
+        area = np.maximum(area, 1e-9 * float(area.mean()))
+        solve = spd(diags(area) + width**2 * self._stiffness)
+        return np.stack([solve(column) for column in masses.T], axis=1)
+
+    def masses(self, label: Ints) -> Array:
+        """Return the area (p, k) of each region at the vertices of the opened mesh."""
+        faces, count = self.opened.mesh.faces, int(label.max()) + 1
+        third = np.repeat(self.face_area / 3.0, 3)
+        return coo_matrix(
+            (third, (faces.ravel(), np.repeat(label, 3))),
+            shape=(len(self.opened.vertex), count),
+        ).toarray()
+
+    def fields(self, label: Ints, width: float) -> Array:
+        """Return the diffused indicator functions (p, k) of regions, labels of faces (m,)."""
+        return self.diffused(self.masses(label), width)
+
+    def fair(self, label: Ints, width: float, rounds: int = 2) -> Ints:
+        """Make boundaries between regions fair; return the region of each face (m,).
+
+        Regions stay connected; those that vanish are left out.
+        """
+        for _ in range(rounds):
+            value = self.fields(label, width)[self.opened.mesh.faces].sum(axis=1)
+            label = value.argmax(axis=1)
+        return numbered(connected(self.mesh, label, value))
+
+    def cut_between(self, fields: Array) -> tuple[Mesh, Ints]:
+        """Divide triangles along the boundaries between regions.
+
+        Parameters
+        ----------
+        fields : ndarray, (p, k)
+            Values of each region at the vertices of the opened mesh.
+
+        Returns
+        -------
+        mesh : Mesh
+            New vertices on edges come after the others.
+        label : ndarray of int, (m,)
+            The region of each face.
+        """
+        mesh, corner = self.mesh, self.opened.mesh.faces
+        best = fields.argmax(axis=1)
+        # Each half-edge with the copies of its ends.
+        i, j = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+        origin, dest = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+        a, b = best[i], best[j]
+        first = fields[i, a] - fields[i, b]
+        share = first / np.maximum(first + fields[j, b] - fields[j, a], 1e-300)
+        second = _second(len(best), i, j, a, b, share)
+        s, t = second[i], second[j]
+        crossed = (a != b) & (s != b) & (t != a) & ~((s == t) & (s >= 0))
+        forward = origin < dest
+        key = np.minimum(origin, dest) * len(mesh.vertices) + np.maximum(origin, dest)
+        share = np.where(forward, share, 1.0 - share)
+        edges, which = np.unique(key[crossed], return_inverse=True)
+        if not len(edges):
+            return mesh, self._labels(mesh.faces, np.arange(len(mesh.faces)), fields, None)
+        place = np.bincount(which, share[crossed]) / np.bincount(which)
+        place = np.clip(place, _SNAP / 2, 1.0 - _SNAP / 2)
+        ends = np.stack(np.divmod(edges, len(mesh.vertices)), axis=1)
+        finer, owner = parts_of(mesh, ends, place)
+        fields = fields.copy()
+        tied = np.flatnonzero(second >= 0)
+        fields[tied, second[tied]] = fields[tied, best[tied]]
+        label = connected(finer, self._labels(finer.faces, owner, fields, (ends, place)))
+        return _without_ears(finer, label), label
+
+    def _labels(
+        self, faces: Ints, owner: Ints, fields: Array, inserted: tuple[Ints, Array] | None
+    ) -> Ints:
+        """Return the region with the largest value in each part of a triangle."""
+        n = len(self.mesh.vertices)
+        own, copies = self.mesh.faces[owner], self.opened.mesh.faces[owner]
+        value = np.zeros((len(faces), fields.shape[1]))
+
+        def at(vertex: Ints) -> Array:
+            place = (own == vertex[:, None]).argmax(axis=1)
+            return fields[copies[np.arange(len(own)), place]]
+
+        for corner in faces.T:
+            old = corner < n
+            if inserted is None or old.all():
+                value += at(corner)
+                continue
+            ends, share = inserted
+            k = np.where(old, 0, corner - n)
+            one, two = (np.where(old, corner, ends[k, side]) for side in (0, 1))
+            part = np.where(old, 0.0, share[k])[:, None]
+            value += (1.0 - part) * at(one) + part * at(two)
+        return np.asarray(value.argmax(axis=1))
+
+
+def seam_edges(mesh: Mesh, label: Ints) -> Ints:
+    """Return the edges (e, 2) between faces of different regions."""
+    he = mesh.half_edges
+    k = he.interior
+    k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]
+    return np.stack([he.origin[k], he.dest[k]], axis=1)
+
+
+def _without_ears(mesh: Mesh, label: Ints) -> Mesh:
+    """Flip the inner edge of triangles with two sides on seams, which could fold freely.
+
+    The edge is flipped where both new triangles have a good shape and nearly the old normals.
+    """
+    he, n = mesh.half_edges, len(mesh.vertices)
+    inside = he.twin >= 0
+    inside[inside] = label[he.face[inside]] == label[he.face[he.twin[inside]]]
+    number = np.bincount(he.face[inside], minlength=len(mesh.faces))
+    k = np.flatnonzero(inside & (number[he.face] == 1))
+    k = k[number[he.face[he.twin[k]]] > 1]
+    one, two = he.face[k], he.face[he.twin[k]]
+    faces = mesh.faces.copy()
+    a, b = he.origin[k], he.dest[k]
+    c = faces[one].sum(axis=1) - a - b
+    d = faces[two].sum(axis=1) - a - b
+    new = np.stack([np.stack([c, a, d], axis=1), np.stack([d, b, c], axis=1)], axis=1)
+    normal = geometry.area_vectors(mesh.vertices, faces[one])
+    normal += geometry.area_vectors(mesh.vertices, faces[two])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    fine = np.ones(len(k), bool)
+    for side in (0, 1):
+        own = geometry.area_vectors(mesh.vertices, new[:, side])
+        size = np.linalg.norm(own, axis=1)
+        fine &= np.einsum("kd,kd->k", own, normal) > _ALIKE * size
+        angle = geometry.corner_angles(mesh.vertices, new[:, side]).min(axis=1)
+        fine &= angle > _THIN
+    taken = edge_keys(np.minimum(c, d), np.maximum(c, d), n)
+    fine &= ~np.isin(taken, pair_keys(mesh.edges, n))
+    _, first = np.unique(two, return_index=True)
+    chosen = np.intersect1d(first, np.flatnonzero(fine))
+    faces[one[chosen]], faces[two[chosen]] = new[chosen, 0], new[chosen, 1]
+    return Mesh(mesh.vertices, faces, attributes=mesh.attributes)
+
+
+def numbered(label: Ints) -> Ints:
+    """Number regions from 0 on without gaps."""
+    return np.unique(label, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+
+def connected(mesh: Mesh, label: Ints, value: Array | None = None) -> Ints:
+    """Give all but the largest part of each region to the neighbours.
+
+    Each face goes to the region with the largest value (m, k), or to that of a neighbour.
+    """
+    he, label = mesh.half_edges, label.copy()
+    k = he.interior
+    f, g = he.face[k], he.face[he.twin[k]]
+    for _ in range(_ROUNDS):
+        bad = _fragments(label, f, g)
+        if not bad.any():
+            break
+        if value is not None:
+            value = value.copy()
+            value[np.flatnonzero(bad), label[bad]] = -np.inf
+            label[bad] = value[bad].argmax(axis=1)
+            continue
+        while bad.any():
+            front = bad[f] & ~bad[g]
+            if not front.any():
+                break
+            label[f[front]] = label[g[front]]
+            bad[f[front]] = False
+    return label
+
+
+def _fragments(label: Ints, f: Ints, g: Ints) -> Flags:
+    """Mark the faces that are not in the largest part of their region."""
+    same = label[f] == label[g]
+    part = label_components(len(label), f[same], g[same])
+    size = np.bincount(part)
+    first = np.unique(part, return_index=True)[1]
+    order = np.lexsort((-size, label[first]))
+    _, largest = np.unique(label[first][order], return_index=True)
+    whole = np.zeros(len(size), bool)
+    whole[order[largest]] = True
+    # A whole component has no neighbour to go to.
+    alone = np.ones(len(size), bool)
+    alone[part[f[~same]]] = False
+    return ~(whole | alone)[part]
+
+
+def _second(count: int, i: Ints, j: Ints, a: Ints, b: Ints, share: Array) -> Ints:
+    """Return a second region (p,) of vertices through which a boundary goes, -1 for the others."""
+    vertex = np.r_[i, j]
+    other = np.r_[b, a]
+    near = np.r_[share, 1.0 - share]
+    some = np.flatnonzero((np.r_[a, b] != other) & (near < _SNAP))
+    some = some[np.argsort(-near[some], kind="stable")]
+    out = np.full(count, -1)
+    out[vertex[some]] = other[some]
+    return out

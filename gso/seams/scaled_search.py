@@ -1,0 +1,363 @@
+"""The search for few pieces of a triangle mesh whose shape may change within a distance.
+
+Regions are found on a copy at the scale of the distance (:mod:`gso.seams.coarse_copy`). An estimate
+orders the candidates, and the joint solve of the pieces decides: the search begins with few
+regions, divides those that do not hold what is allowed, and merges neighbours where there is room.
+The boundaries between regions are then carried back to the design as curves through triangles,
+and its pieces are solved from the shape of the copy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from gso import metrics
+from gso.cut_pieces import Pieces
+from gso.mesh import Mesh, Nearest
+from gso.seams.candidates import disks
+from gso.seams.carrying import base_fields, base_start
+from gso.seams.coarse_copy import CoarseCopy, coarse_copy
+from gso.seams.compact_patches import patches
+from gso.seams.cutting import cut
+from gso.seams.distance_estimate import DistanceEstimates
+from gso.seams.kinds import Edges
+from gso.seams.merging import Merging
+from gso.seams.options import PieceSettings
+from gso.seams.regions import Regions, numbered, seam_edges
+from gso.seams.tree import Ground
+from gso.seams.trial import Allowed, Trial, options_for, tried
+from gso.typing import Array, Flags, Ints
+
+#: Share of what is allowed that pieces of the copy may use.
+_ROOM = 0.95
+#: Bounds on the estimated distance over the allowed one that are tried, in turn.
+_LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
+#: Numbers of patches, and how much compact pieces are preferred.
+_PATCHES, _COMPACT = (100, 200), (2.0, 5.0)
+#: Share of the area in pieces that do not hold up to which these alone are divided, and how often.
+_FEW, _DIVISIONS = 0.4, 3
+#: Range of the factor on the bound of a piece that is divided.
+_SMALLER = (0.35, 0.8)
+#: Width of the diffusion that makes boundaries fair, in mean edges of the copy.
+_WIDTH = 1.5
+#: Factor on the cost of seams along creases.
+_CREASE = 0.3
+#: Rounds of merges, share of the pieces that take part in one, and the largest estimate.
+_MERGES, _SHARE, _LIKELY = 3, 0.25, 1.5
+#: Angle defect, in degrees, from which on a vertex is the apex of a cone.
+_APEX = 60.0
+#: Area of a region over the mean, below which it goes to a neighbour at first.
+_SMALL = 0.08
+#: Iterations of the solve of the design, from the shape of the copy.
+_ITERATIONS = 16
+#: How often these are solved again where they nearly hold.
+_REPAIRS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What the search knows about a design."""
+
+    design: Mesh
+    copy: CoarseCopy
+    allowed: Allowed
+    settings: PieceSettings
+
+    @cached_property
+    def near(self) -> Nearest:
+        return Nearest(self.design)
+
+    @cached_property
+    def points(self) -> Array:
+        """The vertices of the design (d, 3)."""
+        return self.design.vertices[self.design.used]
+
+    @cached_property
+    def ground(self) -> Ground:
+        mesh, lines = self.copy.mesh, self.copy.lines
+        factor = None
+        if len(lines):
+            factor = np.ones(len(mesh.edges))
+            factor[mesh.edge_numbers(lines[:, 0], lines[:, 1])] = _CREASE
+        return Ground.of(mesh, factor)
+
+    @cached_property
+    def regions(self) -> Regions:
+        return Regions(self.copy.mesh, self.copy.lines)
+
+    @cached_property
+    def estimate(self) -> DistanceEstimates:
+        return DistanceEstimates(self.ground.estimates, self.regions, self.allowed.distance)
+
+    @cached_property
+    def width(self) -> float:
+        return _WIDTH * float(self.copy.mesh.edge_lengths.mean())
+
+    @cached_property
+    def first_patches(self) -> list[Ints]:
+        mesh, lines = self.copy.mesh, self.copy.lines
+        return [patches(mesh, count, lines) for count in _PATCHES]
+
+    def merged(self, label: Ints, level: Array, compact: float) -> Ints:
+        """Merge regions up to a bound (m,) on the estimate, given for each face."""
+        bound = np.log(np.maximum(level, 1e-12))
+
+        def estimate(faces: Ints) -> float | None:
+            found = self.estimate(faces)
+            area = self.regions.face_area[faces]
+            return found and found / float(np.exp(area @ bound[faces] / area.sum()))
+
+        merging = Merging(self.ground, label, 1.0, compact, estimate)
+        return numbered(merging.run())
+
+    def divided(self, level: float) -> Ints:
+        """Return the best regions for a bound on the estimate."""
+        bound = np.full(len(self.copy.mesh.faces), level)
+        found = []
+        for label in self.first_patches:
+            for compact in _COMPACT:
+                own = self.regions.fair(self.merged(label, bound, compact), self.width)
+                found.append(self.without_small(own))
+        return min(found, key=self.value)
+
+    def value(self, label: Ints) -> tuple[int, float, float]:
+        mesh = self.copy.mesh
+        ends = seam_edges(mesh, label)
+        length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
+        size = float(np.sqrt(self.regions.face_area.sum()))
+        return self.settings.value(int(label.max()) + 1, float(length.sum()) / size)
+
+    def without_small(self, label: Ints) -> Ints:
+        """Merge regions that are much smaller than the others with their neighbours."""
+        area, mesh = self.regions.face_area, self.copy.mesh
+        while True:
+            size = np.bincount(label, area)
+            small = np.flatnonzero(size < _SMALL * size.mean())
+            he = mesh.half_edges
+            k = he.interior
+            a, b = label[he.face[k]], label[he.face[he.twin[k]]]
+            length = np.linalg.norm(
+                mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1
+            )
+            for own in small[np.argsort(size[small], kind="stable")].tolist():
+                beside = np.bincount(
+                    np.r_[b[(a == own) & (b != own)], a[(b == own) & (a != own)]],
+                    np.r_[length[(a == own) & (b != own)], length[(b == own) & (a != own)]],
+                    len(size),
+                )
+                if beside.any():
+                    label = numbered(np.where(label == own, beside.argmax(), label))
+                    break
+            else:
+                return label
+
+    def measured(self, label: Ints) -> Trial:
+        """Solve and measure regions of the copy."""
+        regions = self.regions
+        divided = regions.cut_between(regions.fields(label, self.width))
+        pieces = self.opened(divided, self.apexes)
+        allowed = replace(self.allowed, distance=_ROOM * self.allowed.distance)
+        return tried(
+            label,
+            divided,
+            pieces,
+            Nearest(self.copy.mesh),
+            self.copy.mesh.vertices,
+            allowed,
+            executor=self.settings.executor,
+        )
+
+    @cached_property
+    def apexes(self) -> Ints:
+        """Vertices of the copy at the apex of a cone, to which a piece has to be cut."""
+        mesh = self.copy.mesh
+        sharp = self.ground.potential.curvature > np.radians(_APEX)
+        sharp &= ~mesh.half_edges.boundary_vertex
+        sharp[self.copy.lines] = False
+        return np.flatnonzero(sharp)
+
+    def opened(self, divided: tuple[Mesh, Ints], apexes: Ints) -> Pieces:
+        """Cut between regions, to the apexes of cones, and until all pieces are disks."""
+        mesh, edges = divided[0], seam_edges(*divided)
+        ground = Ground.of(mesh)
+        reached = mesh.half_edges.boundary_vertex.copy()
+        reached[edges] = True
+        for apex in apexes.tolist():
+            if reached[apex] or not reached.any():
+                continue
+            line = ground.paths.cheapest(apex, reached, np.ones(len(mesh.edges)))
+            edges = np.concatenate([edges, np.stack([line[:-1], line[1:]], axis=1)])
+            reached[line] = True
+        return disks(ground, edges)
+
+    def smaller(self, trial: Trial, excess: Array) -> Ints:
+        """Divide the regions whose excess (k,) is more than one."""
+        label, mesh = trial.label, self.copy.mesh
+        bad = excess > 1.0
+        level = np.zeros(len(label))
+        for own in np.flatnonzero(bad):
+            faces = np.flatnonzero(label == own)
+            found = self.estimate(faces)
+            found = _LEVELS[0] if found is None else max(found, _LEVELS[-1] / 2)
+            level[faces] = found * float(np.clip(1.0 / excess[own], *_SMALLER))
+        kept = np.concatenate([seam_edges(mesh, label), self.copy.lines])
+        finer = patches(mesh, max(_PATCHES[-1], 4 * len(excess)), kept)
+        start = numbered(np.where(bad[label], finer + len(excess), label))
+        new = self.merged(start, level, _COMPACT[0])
+        return self.regions.fair(new, self.width, rounds=1)
+
+
+def divided_within(
+    design: Mesh, settings: PieceSettings, kept: Ints
+) -> Trial:
+    """Find few pieces of a triangle mesh that become developable within a distance.
+
+    Parameters
+    ----------
+    design : Mesh
+    settings : PieceSettings
+        Its `max_deviation` is given.
+    kept : ndarray of int, (k, 2)
+        Edges that seams prefer as they do creases.
+
+    Returns
+    -------
+    Trial
+        The best one of the design; it may not hold what is allowed.
+    """
+    if settings.max_deviation is None:
+        raise ValueError("the search within a distance needs max_deviation")
+    settings.say("a copy at the scale of the distance")
+    allowed = Allowed(settings.max_deviation, settings.max_strain)
+    copy = coarse_copy(design, allowed.distance, kept)
+    search = _Search(design, copy, allowed, settings)
+    best = _of_copy(search)
+    return _of_design(search, best)
+
+
+def _of_copy(search: _Search) -> Trial:
+    """Return the best trial on the copy."""
+    say = search.settings.say
+    found: list[Trial] = []
+    for level in _LEVELS:
+        label = search.divided(level)
+        if found and label.max() == found[-1].label.max():
+            continue
+        for number in range(_DIVISIONS + 1):
+            say(f"seams and shape, attempt {len(found) + 1}: {label.max() + 1} pieces")
+            found.append(search.measured(label))
+            excess = found[-1].of_regions()
+            area = np.bincount(label, search.regions.face_area)
+            few = area[excess > 1.0].sum() <= _FEW * area.sum()
+            if found[-1].holds or not few or number == _DIVISIONS:
+                break
+            label = search.smaller(found[-1], excess)
+        if found[-1].holds:
+            break
+    best = min(found, key=lambda one: _rank(one, search.settings))
+    return _merged(search, best) if best.holds else best
+
+
+def _rank(trial: Trial, settings: PieceSettings) -> tuple[float, ...]:
+    value = settings.value(len(trial.pieces), trial.pieces.seam_length)
+    return (max(float(trial.excess.max()), 1.0), *value)
+
+
+def _merged(search: _Search, best: Trial) -> Trial:
+    """Merge neighbours as long as all pieces hold what is allowed."""
+    forbidden: set[tuple[bytes, bytes]] = set()
+    for _ in range(_MERGES):
+        pairs = _pairs(search, best, forbidden)
+        if not pairs:
+            break
+        while pairs:
+            search.settings.say(f"{len(best.pieces)} pieces, without {len(pairs)} of them")
+            trial = search.measured(_joined(search, best.label, pairs))
+            if trial.holds:
+                best = trial
+                break
+            excess = trial.of_regions()
+            failed = [
+                pair
+                for pair in pairs
+                if excess[np.bincount(trial.label[best.label == pair[0]]).argmax()] > 1.0
+            ]
+            failed = failed or pairs
+            forbidden |= {_name(best.label, pair) for pair in failed}
+            pairs = [pair for pair in pairs if pair not in failed]
+    return best
+
+
+def _joined(search: _Search, label: Ints, pairs: list[tuple[int, int]]) -> Ints:
+    out = label.copy()
+    for a, b in pairs:
+        out[label == b] = a
+    return search.regions.fair(numbered(out), search.width, rounds=1)
+
+
+def _name(label: Ints, pair: tuple[int, int]) -> tuple[bytes, bytes]:
+    one, two = (np.packbits(label == k).tobytes() for k in pair)
+    return one, two
+
+
+def _pairs(
+    search: _Search, trial: Trial, forbidden: set[tuple[bytes, bytes]]
+) -> list[tuple[int, int]]:
+    """Choose pairs of neighbours to merge, those with the least estimate first."""
+    label, mesh = trial.label, search.copy.mesh
+    he = mesh.half_edges
+    k = he.interior
+    a, b = label[he.face[k]], label[he.face[he.twin[k]]]
+    beside = np.unique(np.sort(np.stack([a, b], axis=1)[a != b], axis=1), axis=0)
+    ranked = []
+    for a_, b_ in beside.tolist():
+        if _name(label, (a_, b_)) in forbidden:
+            continue
+        found = search.estimate(np.flatnonzero((label == a_) | (label == b_)))
+        if found is not None and found <= _LIKELY:
+            ranked.append((found, a_, b_))
+    used: set[int] = set()
+    out = []
+    for _, one, two in sorted(ranked):
+        if len(out) >= max(1, round(_SHARE * (label.max() + 1))):
+            break
+        if not used & {one, two}:
+            used |= {one, two}
+            out.append((one, two))
+    return out
+
+
+def _of_design(search: _Search, best: Trial) -> Trial:
+    """Carry regions back to the design, and solve its pieces from the shape of the copy."""
+    copy, settings = search.copy, search.settings
+    base = Regions(copy.smooth, copy.creases)
+    out = None
+    fairer, trial = 1.0, best
+    for number in range(2):
+        settings.say("the design's own pieces")
+        fields = base_fields(base, search.regions, copy, trial.label, search.width)
+        divided = base.cut_between(fields)
+        pieces = search.opened(divided, copy.ids[search.apexes])
+        start = base_start(copy, trial, pieces)
+        own = tried(
+            trial.label,
+            divided,
+            pieces,
+            search.near,
+            search.points,
+            search.allowed,
+            start,
+            _ITERATIONS,
+            repairs=_REPAIRS,
+            executor=settings.executor,
+        )
+        if out is None or _rank(own, settings) < _rank(out, settings):
+            out = own
+        if own.holds or number == 1:
+            break
+        trial = search.measured(search.smaller(trial, np.maximum(own.of_regions(), trial.of_regions())))
+    return out

@@ -1,0 +1,263 @@
+"""A division of a design into regions, solved and measured piece by piece."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+
+from gso import faults, metrics
+from gso.cut_pieces import Pieces
+from gso.errors import MeshError
+from gso.executors import SERIAL, Executor
+from gso.mesh import Mesh, Nearest
+from gso.mesh.topology import edge_graph
+from gso.pipeline import lay_out
+from gso.result import Result
+from gso.seams.joint_solve import solve_pieces
+from gso.tasks.developable import Options
+from gso.tasks.request import Request
+from gso.tasks.start import Start
+from gso.typing import Array, Flags, Ints
+
+#: Share of the allowed distance beyond which the solver penalises it, and the weight of that.
+_REACH, _WEIGHT = 0.88, 1000.0
+#: Factors on the weights of fairness, curvature and proximity of the joint solve.
+_FAIR, _CURVED, _NEAR = 3.0, 2.0, 0.3
+#: What a folded face adds to a piece's excess, and the exponent and largest value of that of the
+#: strain, which says less than the distance how much smaller a piece has to be.
+_FOLD, _ROOT, _MOST = 0.02, 0.25, 2.5
+#: Largest distance, strain and number of folds (a share of the faces, and a number) of a result
+#: that is solved again with more weight on what is too large.
+_FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.4, 12.0, 0.002, 12
+#: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
+#: rounds in which vertices of folds move between their neighbours.
+_BELOW, _MORE, _AGAIN, _ROUNDS = 0.95, 2.0, 8, 10
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What pieces are measured by: largest distance from the design, and strain."""
+
+    distance: float
+    strain: float
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Regions of a mesh with the joint solve of their pieces.
+
+    Attributes
+    ----------
+    label : ndarray of int, (m,)
+        The region of each face of the mesh that was divided.
+    pieces : Pieces
+        The pieces of the regions; triangles on seams are divided.
+    region : ndarray of int, (p,)
+        The region of each piece.
+    result : Result or None
+        The joint solve; None where no vertex is inside a piece.
+    distance, strain : ndarray, (p,)
+        Largest distance of each piece from the design, and strain of its pattern, over what is
+        allowed.
+    folds : ndarray of int, (p,)
+        Number of folded faces of each piece that are not folded in the design.
+    """
+
+    label: Ints
+    pieces: Pieces
+    region: Ints
+    result: Result | None
+    distance: Array
+    strain: Array
+    folds: Ints
+
+    @cached_property
+    def excess(self) -> Array:
+        """What each piece (p,) needs over what is allowed: up to 1 it holds."""
+        strain = np.where(
+            self.strain > 1.0, np.minimum(np.maximum(self.strain, 1.0) ** _ROOT, _MOST), 0.0
+        )
+        folds = np.where(self.folds > 0, np.minimum(1.0 + _FOLD * self.folds, _MOST), 0.0)
+        return np.asarray(np.max([self.distance, strain, folds], axis=0))
+
+    @property
+    def holds(self) -> bool:
+        """Whether all pieces hold what is allowed."""
+        return bool((self.excess <= 1.0).all())
+
+    def of_regions(self) -> Array:
+        """Return the largest excess (k,) of the pieces of each region."""
+        out = np.zeros(int(self.label.max()) + 1)
+        np.maximum.at(out, self.region, self.excess)
+        return out
+
+    @property
+    def shape(self) -> Pieces:
+        """The pieces after the solve."""
+        solved = None if self.result is None else self.result.pieces
+        return self.pieces if solved is None else solved
+
+
+def options_for(allowed: Allowed, fairer: float = 1.0) -> Options:
+    """Return the settings of a joint solve within a distance."""
+    own = Options().for_pieces()
+    return replace(
+        own,
+        w_fairness=_FAIR * fairer * own.w_fairness,
+        w_curvature=_CURVED * fairer * own.w_curvature,
+        w_proximity=_NEAR * own.w_proximity,
+        reach=_REACH * allowed.distance,
+        w_reach=_WEIGHT,
+    )
+
+
+def tried(
+    label: Ints,
+    divided: tuple[Mesh, Ints],
+    pieces: Pieces,
+    near: Nearest,
+    design: Array,
+    allowed: Allowed,
+    start: Array | None = None,
+    iterations: int | None = None,
+    options: Options | None = None,
+    repairs: int = 1,
+    executor: Executor = SERIAL,
+) -> Trial:
+    """Solve and measure pieces.
+
+    Parameters
+    ----------
+    label : ndarray of int
+        Regions of the mesh that was divided.
+    divided : (Mesh, ndarray of int)
+        The mesh with vertices on seams, and the region of each face.
+    pieces : Pieces
+        Its pieces, all of them disks.
+    near : Nearest
+        The design.
+    design : ndarray, (d, 3)
+        Its vertices.
+    allowed : Allowed
+    start : ndarray, (n, 3), optional
+        Points of the divided mesh to begin with.
+    iterations : int, optional
+        Number of iterations from there.
+    options : Options, optional
+    repairs : int
+        How often a result that nearly holds is solved again.
+    executor : Executor
+        Lays pieces flat; the result does not depend on it.
+    """
+    region = divided[1][[part.faces[0] for part in pieces.parts]]
+    own = options or options_for(allowed)
+    best: Trial | None = None
+    for _ in range(repairs + 1):
+        begin = Start(start, iterations=iterations if start is not None else None)
+        asked = Request("developable", "curvature", own, start=begin, verdict=False)
+        try:
+            result = solve_pieces(pieces, asked)
+        except MeshError:
+            result = None
+        trial = _measured(label, pieces, region, result, near, design, allowed, executor)
+        if best is None or trial.excess.max() < best.excess.max():
+            best = trial
+        if trial.holds or result is None or not _repairable(trial):
+            break
+        own = _stricter(own, trial)
+        start, iterations = untangled(trial.shape, _folded(trial)), _AGAIN
+    return best or trial
+
+
+def _repairable(trial: Trial) -> bool:
+    """Whether what is too large is so little that another solve from there may do."""
+    far, strain = float(trial.distance.max()), float(trial.strain.max())
+    folds = int(trial.folds.sum())
+    most = _DOUBTFUL_FOLDS * len(trial.pieces.design.faces) + _SOME_FOLDS
+    return far <= _FAR and strain <= _STRAINED and folds <= most
+
+
+def _stricter(options: Options, trial: Trial) -> Options:
+    """Return settings with more weight on what is too large."""
+    far, strain = float(trial.distance.max()), float(trial.strain.max())
+    if far > 1.0 and options.reach is not None:
+        options = replace(options, reach=options.reach * _BELOW / far)
+    if strain > 1.0:
+        options = replace(options, w_curvature=_MORE * options.w_curvature)
+    return options
+
+
+def _measured(
+    label: Ints,
+    pieces: Pieces,
+    region: Ints,
+    result: Result | None,
+    near: Nearest,
+    design: Array,
+    allowed: Allowed,
+    executor: Executor,
+) -> Trial:
+    shape = pieces if result is None or result.pieces is None else result.pieces
+    meshes = [part.mesh for part in shape.parts]
+    strain = np.array(executor.map(_strain, meshes))
+    distance = np.array([float(near.distances(mesh.vertices).max()) for mesh in meshes])
+    # And back: from the design to the nearest piece.
+    face, away = Nearest(shape.design).nearest(design)
+    np.maximum.at(distance, shape.of_face[face], away)
+    out = Trial(
+        label,
+        pieces,
+        region,
+        result,
+        distance / allowed.distance,
+        strain / allowed.strain,
+        np.zeros(len(meshes), np.int64),
+    )
+    folds = np.bincount(shape.of_face[_folded(out)], minlength=len(meshes))
+    return replace(out, folds=folds)
+
+
+def _folded(trial: Trial) -> Ints:
+    """Return the faces that are folded inside pieces, and are not in the design."""
+    before = faults.folded(trial.pieces.opened.mesh)
+    return np.setdiff1d(faults.folded(trial.shape.opened.mesh), before)
+
+
+def untangled(shape: Pieces, folded: Ints) -> Array:
+    """Return the points of a surface (n, 3) with the vertices of folded faces between neighbours.
+
+    Those on seams move to the middle of their neighbours on the seam, if there are two.
+    """
+    mesh = shape.design
+    points, n = mesh.vertices.copy(), len(mesh.vertices)
+    on, rim = np.zeros(n, bool), mesh.half_edges.boundary_vertex
+    on[shape.edges] = True
+
+    def means(edges: Ints, only: int | None = None) -> tuple[csr_matrix, Flags]:
+        ends = np.concatenate([edges, edges[:, ::-1]])
+        matrix = edge_graph(n, ends[:, 0], ends[:, 1])
+        number = np.bincount(ends[:, 0], minlength=n)
+        scaled = diags(1.0 / np.maximum(number, 1)) @ matrix
+        return scaled, number > 0 if only is None else number == only
+
+    inner, _ = means(mesh.edges)
+    along, between = means(shape.edges, 2)
+    some = np.zeros(n, bool)
+    some[mesh.faces[folded]] = True
+    free, seam = some & ~on & ~rim, some & on & between & ~rim
+    for _ in range(_ROUNDS):
+        moved = points.copy()
+        moved[free] = (inner @ points)[free]
+        moved[seam] = (along @ points)[seam]
+        points = 0.5 * (points + moved)
+    return points
+
+
+def _strain(mesh: Mesh) -> float:
+    pattern = lay_out(mesh)
+    if pattern is None:
+        return np.inf
+    return metrics.strains(mesh, pattern.flat)["strain_max"]
