@@ -1,17 +1,25 @@
-"""Displacement from reference points over how far each may move."""
+"""Distance from a reference surface over how far each vertex may be away.
+
+Before every linearisation a vertex gets the closest point of the surface and the tangent plane there
+(iterated closest points, as in :func:`gso.energy.proximity.closest`), as long as that is near the
+vertex's own point of reference. Held vertices keep theirs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gso.energy import proximity
 from gso.energy.base import Term
-from gso.mesh import Mesh
-from gso.typing import Array, S, Vec
+from gso.mesh import Mesh, Nearest
+from gso.typing import Array, Flags, S, Vec
 
+#: How far a closest point may be from the vertex's own point of reference, over its limit, and the
+#: least cosine between normals; otherwise it may be on another part of the surface.
+_SLIDE, _ALIKE = 1.5, 0.5
 #: The reference does not move with the surface.
 INVARIANT = ()
 
@@ -22,10 +30,10 @@ def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
     return tuple(x / constants[7] for x in moved)
 
 
-def build(mesh: Mesh, normals: Array, limits: Array, *, tangential: float | Array = 0.0) -> Term:
-    """Build the displacement of every vertex over its limit.
+def build(mesh: Mesh, normals: Array, limits: Array, held: Flags) -> Term:
+    """Build the distance of every vertex from a surface, over its limit.
 
-    Weights are those of the squared displacement.
+    Weights are those of the squared distance.
 
     Parameters
     ----------
@@ -34,15 +42,29 @@ def build(mesh: Mesh, normals: Array, limits: Array, *, tangential: float | Arra
     normals : ndarray, (n, 3)
         Unit normals at its vertices.
     limits : ndarray, (n,)
-        How far each may move, above 0.
-    tangential : float or ndarray, (n,)
-        Factor on the tangential part of a displacement.
+        How far each may be away, above 0.
+    held : ndarray of bool, (n,)
+        Vertices for which the whole displacement counts.
     """
-    near = proximity.build(mesh, normals, tangential=tangential)
+    near = Nearest(mesh, normals)
+    own = proximity.build(mesh, normals, tangential=held.astype(float))
+    constants = np.concatenate([own.constants, limits[None]])
+
+    def refresh(blocks: Mapping[str, Array]) -> Array:
+        feet = near.feet(blocks["surface"])
+        slid = np.linalg.norm(feet.points - mesh.vertices, axis=1) <= _SLIDE * limits
+        slid &= np.einsum("nd,nd->n", feet.normals, normals) > _ALIKE
+        slid &= ~held
+        out = constants.copy()
+        out[:3, slid], out[3:6, slid] = feet.points[slid].T, feet.normals[slid].T
+        return out
+
     return replace(
-        near,
+        own,
         name="reach",
         residual=residual,
-        weights=near.weights * limits**2,
-        constants=np.concatenate([near.constants, limits[None]]),
+        weights=own.weights * limits**2,
+        constants=constants,
+        linear=False,
+        refresh=refresh,
     )

@@ -25,7 +25,7 @@ from gso.typing import Ints
 #: Share of the distance that smoothing may use.
 _SMOOTH = 0.3
 #: Edge of the copy over the distance, and least and most vertices of a copy.
-_EDGE, _FEWEST, _MOST = 1.15, 700, 2200
+_EDGE, _FEWEST, _MOST = 1.35, 700, 1700
 #: Factor on the number of vertices where the surface is round, and the curvature over that of a
 #: ball of the distance from which on it is.
 _FINE, _ROUND = 3, 0.4

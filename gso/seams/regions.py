@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags
@@ -30,9 +31,35 @@ _ACROSS = 0.05
 #: Shares of an edge next to its ends in which a boundary goes through the end.
 _SNAP = 0.2
 #: Cosine between normals, and smallest angle in radians, of triangles of a flipped edge.
-_ALIKE, _THIN = 0.7, 0.12
+_ALIKE, _THIN = 0.5, 0.06
 #: Rounds in which fragments of regions go to their neighbours.
 _ROUNDS = 8
+
+
+class Divided(NamedTuple):
+    """A mesh whose triangles are divided along the boundaries between regions.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        New vertices on edges come after the others.
+    label : ndarray of int, (m,)
+        The region of each face.
+    ends : ndarray of int, (k, 2)
+        The edge on which each new vertex lies.
+    shares : ndarray, (k,)
+        Its place on it, 0 to 1.
+    """
+
+    mesh: Mesh
+    label: Ints
+    ends: Ints
+    shares: Array
+
+    def moved(self, points: Array) -> Array:
+        """Return points (n + k, 3) for those of the mesh that was divided (n, 3)."""
+        a, b = points[self.ends[:, 0]], points[self.ends[:, 1]]
+        return np.concatenate([points, a + self.shares[:, None] * (b - a)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,20 +135,13 @@ class Regions:
             label = value.argmax(axis=1)
         return numbered(connected(self.mesh, label, value))
 
-    def cut_between(self, fields: Array) -> tuple[Mesh, Ints]:
+    def cut_between(self, fields: Array) -> Divided:
         """Divide triangles along the boundaries between regions.
 
         Parameters
         ----------
         fields : ndarray, (p, k)
             Values of each region at the vertices of the opened mesh.
-
-        Returns
-        -------
-        mesh : Mesh
-            New vertices on edges come after the others.
-        label : ndarray of int, (m,)
-            The region of each face.
         """
         mesh, corner = self.mesh, self.opened.mesh.faces
         best = fields.argmax(axis=1)
@@ -139,7 +159,8 @@ class Regions:
         share = np.where(forward, share, 1.0 - share)
         edges, which = np.unique(key[crossed], return_inverse=True)
         if not len(edges):
-            return mesh, self._labels(mesh.faces, np.arange(len(mesh.faces)), fields, None)
+            label = self._labels(mesh.faces, np.arange(len(mesh.faces)), fields, None)
+            return Divided(mesh, label, np.empty((0, 2), np.int64), np.empty(0))
         place = np.bincount(which, share[crossed]) / np.bincount(which)
         place = np.clip(place, _SNAP / 2, 1.0 - _SNAP / 2)
         ends = np.stack(np.divmod(edges, len(mesh.vertices)), axis=1)
@@ -148,7 +169,7 @@ class Regions:
         tied = np.flatnonzero(second >= 0)
         fields[tied, second[tied]] = fields[tied, best[tied]]
         label = connected(finer, self._labels(finer.faces, owner, fields, (ends, place)))
-        return _without_ears(finer, label), label
+        return Divided(_without_ears(finer, label), label, ends, place)
 
     def _labels(
         self, faces: Ints, owner: Ints, fields: Array, inserted: tuple[Ints, Array] | None
@@ -184,16 +205,22 @@ def seam_edges(mesh: Mesh, label: Ints) -> Ints:
 
 
 def _without_ears(mesh: Mesh, label: Ints) -> Mesh:
-    """Flip the inner edge of triangles with two sides on seams, which could fold freely.
-
-    The edge is flipped where both new triangles have a good shape and nearly the old normals.
-    """
-    he, n = mesh.half_edges, len(mesh.vertices)
+    """Flip the inner edge of triangles with two sides on seams, which could fold freely."""
+    he = mesh.half_edges
     inside = he.twin >= 0
     inside[inside] = label[he.face[inside]] == label[he.face[he.twin[inside]]]
     number = np.bincount(he.face[inside], minlength=len(mesh.faces))
     k = np.flatnonzero(inside & (number[he.face] == 1))
     k = k[number[he.face[he.twin[k]]] > 1]
+    return with_flips(mesh, k)
+
+
+def with_flips(mesh: Mesh, half_edges: Ints) -> Mesh:
+    """Flip edges (k,) of a triangle mesh where both new triangles have a good shape.
+
+    Their normals are to be nearly those of the old ones. No triangle takes part in two flips.
+    """
+    he, n, k = mesh.half_edges, len(mesh.vertices), half_edges
     one, two = he.face[k], he.face[he.twin[k]]
     faces = mesh.faces.copy()
     a, b = he.origin[k], he.dest[k]
@@ -212,8 +239,15 @@ def _without_ears(mesh: Mesh, label: Ints) -> Mesh:
         fine &= angle > _THIN
     taken = edge_keys(np.minimum(c, d), np.maximum(c, d), n)
     fine &= ~np.isin(taken, pair_keys(mesh.edges, n))
-    _, first = np.unique(two, return_index=True)
-    chosen = np.intersect1d(first, np.flatnonzero(fine))
+    used: set[int] = set()
+    made: set[int] = set()
+    chosen = []
+    for i in np.flatnonzero(fine).tolist():
+        own_faces = {int(one[i]), int(two[i])}
+        if not used & own_faces and int(taken[i]) not in made:
+            used |= own_faces
+            made.add(int(taken[i]))
+            chosen.append(i)
     faces[one[chosen]], faces[two[chosen]] = new[chosen, 0], new[chosen, 1]
     return Mesh(mesh.vertices, faces, attributes=mesh.attributes)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from gso import metrics
 from gso.cut_pieces import Pieces
-from gso.mesh import Mesh, Nearest
+from gso.mesh import Mesh
 from gso.seams.candidates import disks
 from gso.seams.carrying import base_fields, base_start
 from gso.seams.coarse_copy import CoarseCopy, coarse_copy
@@ -27,7 +27,7 @@ from gso.seams.distance_estimate import DistanceEstimates
 from gso.seams.kinds import Edges
 from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
-from gso.seams.regions import Regions, numbered, seam_edges
+from gso.seams.regions import Divided, Regions, numbered, seam_edges
 from gso.seams.tree import Ground
 from gso.seams.trial import Allowed, Trial, options_for, tried
 from gso.typing import Array, Flags, Ints
@@ -38,8 +38,9 @@ _ROOM = 0.95
 _LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
 #: Numbers of patches, and how much compact pieces are preferred.
 _PATCHES, _COMPACT = (100, 200), (2.0, 5.0)
-#: Share of the area in pieces that do not hold up to which these alone are divided, and how often.
-_FEW, _DIVISIONS = 0.4, 3
+#: Share of the area in pieces that do not hold, or largest excess of these, up to which they alone
+#: are divided, and how often.
+_FEW, _LITTLE, _DIVISIONS = 0.4, 1.5, 3
 #: Range of the factor on the bound of a piece that is divided.
 _SMALLER = (0.35, 0.8)
 #: Width of the diffusion that makes boundaries fair, in mean edges of the copy.
@@ -54,8 +55,8 @@ _APEX = 60.0
 _SMALL = 0.08
 #: Iterations of the solve of the design, from the shape of the copy.
 _ITERATIONS = 16
-#: How often these are solved again where they nearly hold.
-_REPAIRS = 3
+#: How often these are solved again where they nearly hold, and regions divided where they do not.
+_REPAIRS, _ROUNDS = 3, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +67,6 @@ class _Search:
     copy: CoarseCopy
     allowed: Allowed
     settings: PieceSettings
-
-    @cached_property
-    def near(self) -> Nearest:
-        return Nearest(self.design)
-
-    @cached_property
-    def points(self) -> Array:
-        """The vertices of the design (d, 3)."""
-        return self.design.vertices[self.design.used]
 
     @cached_property
     def ground(self) -> Ground:
@@ -165,8 +157,7 @@ class _Search:
             label,
             divided,
             pieces,
-            Nearest(self.copy.mesh),
-            self.copy.mesh.vertices,
+            self.copy.mesh,
             allowed,
             executor=self.settings.executor,
         )
@@ -180,9 +171,9 @@ class _Search:
         sharp[self.copy.lines] = False
         return np.flatnonzero(sharp)
 
-    def opened(self, divided: tuple[Mesh, Ints], apexes: Ints) -> Pieces:
+    def opened(self, divided: Divided, apexes: Ints) -> Pieces:
         """Cut between regions, to the apexes of cones, and until all pieces are disks."""
-        mesh, edges = divided[0], seam_edges(*divided)
+        mesh, edges = divided.mesh, seam_edges(divided.mesh, divided.label)
         ground = Ground.of(mesh)
         reached = mesh.half_edges.boundary_vertex.copy()
         reached[edges] = True
@@ -252,7 +243,7 @@ def _of_copy(search: _Search) -> Trial:
             found.append(search.measured(label))
             excess = found[-1].of_regions()
             area = np.bincount(label, search.regions.face_area)
-            few = area[excess > 1.0].sum() <= _FEW * area.sum()
+            few = area[excess > 1.0].sum() <= _FEW * area.sum() or excess.max() <= _LITTLE
             if found[-1].holds or not few or number == _DIVISIONS:
                 break
             label = search.smaller(found[-1], excess)
@@ -331,33 +322,36 @@ def _pairs(
     return out
 
 
-def _of_design(search: _Search, best: Trial) -> Trial:
-    """Carry regions back to the design, and solve its pieces from the shape of the copy."""
+def _of_design(search: _Search, trial: Trial) -> Trial:
+    """Carry regions back to the design, and solve its pieces from the shape of the copy.
+
+    Regions that do not hold there are divided on the copy.
+    """
     copy, settings = search.copy, search.settings
     base = Regions(copy.smooth, copy.creases)
-    out = None
-    fairer, trial = 1.0, best
-    for number in range(2):
-        settings.say("the design's own pieces")
+    found: list[Trial] = []
+    for number in range(_ROUNDS):
+        settings.say(f"the design's own pieces, attempt {number + 1}")
         fields = base_fields(base, search.regions, copy, trial.label, search.width)
         divided = base.cut_between(fields)
-        pieces = search.opened(divided, copy.ids[search.apexes])
-        start = base_start(copy, trial, pieces)
+        smooth = search.opened(divided, copy.ids[search.apexes])
+        start = base_start(copy, trial, smooth)
+        design = smooth.design.replaced(divided.moved(copy.base.vertices))
+        pieces = cut(design, Edges(smooth.edges))
         own = tried(
             trial.label,
             divided,
             pieces,
-            search.near,
-            search.points,
+            search.design,
             search.allowed,
             start,
             _ITERATIONS,
             repairs=_REPAIRS,
             executor=settings.executor,
         )
-        if out is None or _rank(own, settings) < _rank(out, settings):
-            out = own
-        if own.holds or number == 1:
+        found.append(own)
+        if own.holds or number == _ROUNDS - 1:
             break
-        trial = search.measured(search.smaller(trial, np.maximum(own.of_regions(), trial.of_regions())))
-    return out
+        excess = np.maximum(own.of_regions(), trial.of_regions())
+        trial = search.measured(search.smaller(trial, excess))
+    return min(found, key=lambda one: _rank(one, settings))

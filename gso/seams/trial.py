@@ -13,17 +13,20 @@ from gso.cut_pieces import Pieces
 from gso.errors import MeshError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh, Nearest
-from gso.mesh.topology import edge_graph
+from gso.mesh.topology import edge_graph, edge_keys, pair_keys
 from gso.pipeline import lay_out
 from gso.result import Result
+from gso.seams.cutting import cut
 from gso.seams.joint_solve import solve_pieces
+from gso.seams.kinds import Edges
+from gso.seams.regions import Divided, with_flips
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
 from gso.typing import Array, Flags, Ints
 
 #: Share of the allowed distance beyond which the solver penalises it, and the weight of that.
-_REACH, _WEIGHT = 0.88, 1000.0
+_REACH, _WEIGHT = 0.9, 5000.0
 #: Factors on the weights of fairness, curvature and proximity of the joint solve.
 _FAIR, _CURVED, _NEAR = 3.0, 2.0, 0.3
 #: What a folded face adds to a piece's excess, and the exponent and largest value of that of the
@@ -34,7 +37,11 @@ _FOLD, _ROOT, _MOST = 0.02, 0.25, 2.5
 _FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.4, 12.0, 0.002, 12
 #: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
 #: rounds in which vertices of folds move between their neighbours.
-_BELOW, _MORE, _AGAIN, _ROUNDS = 0.95, 2.0, 8, 10
+_BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, 2.0, 12, 10
+#: Angle in degrees from which on an edge of a folded face is flipped.
+_FOLDED = 90.0
+#: Share of the allowed distance from which on points inside faces are measured, too.
+_DOUBTFUL = 0.7
 
 
 @dataclass(frozen=True)
@@ -116,10 +123,9 @@ def options_for(allowed: Allowed, fairer: float = 1.0) -> Options:
 
 def tried(
     label: Ints,
-    divided: tuple[Mesh, Ints],
+    divided: Divided,
     pieces: Pieces,
-    near: Nearest,
-    design: Array,
+    design: Mesh,
     allowed: Allowed,
     start: Array | None = None,
     iterations: int | None = None,
@@ -133,14 +139,12 @@ def tried(
     ----------
     label : ndarray of int
         Regions of the mesh that was divided.
-    divided : (Mesh, ndarray of int)
-        The mesh with vertices on seams, and the region of each face.
+    divided : Divided
+        The mesh with vertices on seams.
     pieces : Pieces
         Its pieces, all of them disks.
-    near : Nearest
-        The design.
-    design : ndarray, (d, 3)
-        Its vertices.
+    design : Mesh
+        The surface from which distances count.
     allowed : Allowed
     start : ndarray, (n, 3), optional
         Points of the divided mesh to begin with.
@@ -152,7 +156,6 @@ def tried(
     executor : Executor
         Lays pieces flat; the result does not depend on it.
     """
-    region = divided[1][[part.faces[0] for part in pieces.parts]]
     own = options or options_for(allowed)
     best: Trial | None = None
     for _ in range(repairs + 1):
@@ -162,13 +165,16 @@ def tried(
             result = solve_pieces(pieces, asked)
         except MeshError:
             result = None
-        trial = _measured(label, pieces, region, result, near, design, allowed, executor)
+        # Flips change the areas of pieces, and so perhaps their order.
+        region = divided.label[[part.faces[0] for part in pieces.parts]]
+        trial = _measured(label, pieces, region, result, design, allowed, executor)
         if best is None or trial.excess.max() < best.excess.max():
             best = trial
         if trial.holds or result is None or not _repairable(trial):
             break
         own = _stricter(own, trial)
         start, iterations = untangled(trial.shape, _folded(trial)), _AGAIN
+        pieces = _with_flips(trial)
     return best or trial
 
 
@@ -195,18 +201,22 @@ def _measured(
     pieces: Pieces,
     region: Ints,
     result: Result | None,
-    near: Nearest,
-    design: Array,
+    design: Mesh,
     allowed: Allowed,
     executor: Executor,
 ) -> Trial:
     shape = pieces if result is None or result.pieces is None else result.pieces
     meshes = [part.mesh for part in shape.parts]
     strain = np.array(executor.map(_strain, meshes))
+    near = Nearest(design)
     distance = np.array([float(near.distances(mesh.vertices).max()) for mesh in meshes])
     # And back: from the design to the nearest piece.
-    face, away = Nearest(shape.design).nearest(design)
+    face, away = Nearest(shape.design).nearest(design.vertices[design.used])
     np.maximum.at(distance, shape.of_face[face], away)
+    if _DOUBTFUL * allowed.distance < distance.max() <= allowed.distance:
+        # Points inside faces may be farther away than all vertices.
+        most = metrics.largest_distance(design, shape.design)
+        distance[distance.argmax()] = max(most, float(distance.max()))
     out = Trial(
         label,
         pieces,
@@ -224,6 +234,25 @@ def _folded(trial: Trial) -> Ints:
     """Return the faces that are folded inside pieces, and are not in the design."""
     before = faults.folded(trial.pieces.opened.mesh)
     return np.setdiff1d(faults.folded(trial.shape.opened.mesh), before)
+
+
+def _with_flips(trial: Trial) -> Pieces:
+    """Flip the edges of the design at which the solved pieces are folded."""
+    shape, design = trial.shape, trial.pieces.design
+    mesh = shape.design
+    he = mesh.half_edges
+    k = he.interior
+    bad = np.zeros(len(mesh.faces), bool)
+    bad[_folded(trial)] = True
+    f, g = he.face[k], he.face[he.twin[k]]
+    seam = np.isin(
+        edge_keys(he.origin[k], he.dest[k], len(mesh.vertices)),
+        pair_keys(shape.edges, len(mesh.vertices)),
+    )
+    some = bad[f] & bad[g] & ~seam & (metrics.dihedral_angles(mesh) > _FOLDED)
+    if not some.any():
+        return trial.pieces
+    return cut(with_flips(design, k[some]), Edges(trial.pieces.edges))
 
 
 def untangled(shape: Pieces, folded: Ints) -> Array:

@@ -132,7 +132,7 @@ def _terms(
     items.append(Weighted(near, w_proximity, Distance(o.quadratic_below)))
     if o.reach is not None:
         limits = _limits(mesh, normals, o.reach)
-        far = reach.build(mesh, normals, limits, tangential=_rim(mesh).astype(float))
+        far = reach.build(mesh, normals, limits, _rim(mesh))
         items.append(Weighted(far, o.w_reach, Beyond(1.0)))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
@@ -157,13 +157,13 @@ def _limits(mesh: Mesh, normals: Array, most: float) -> Array:
 
 
 def _rim(mesh: Mesh) -> Flags:
-    """Mark the boundary vertices (n,) that are on no seam: no other one is at the same place."""
-    on = np.flatnonzero(mesh.half_edges.boundary_vertex)
-    _, place, often = np.unique(
-        mesh.vertices[on], axis=0, return_inverse=True, return_counts=True
-    )
+    """Mark the vertices (n,) of boundary edges that are no seam: no other one is at the same place."""
+    ends = mesh.edges[mesh.boundary_edges]
+    _, place = np.unique(mesh.vertices[ends.ravel()], axis=0, return_inverse=True)
+    pairs = np.sort(place.reshape(ends.shape), axis=1)
+    _, same, often = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     rim = np.zeros(len(mesh.vertices), bool)
-    rim[on] = often[place.reshape(-1)] == 1
+    rim[ends[often[same.reshape(-1)] == 1]] = True
     return rim
 
 
