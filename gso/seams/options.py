@@ -13,6 +13,7 @@ from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
 from gso.mesh.topology import pair_keys
 from gso.quantities import as_positive
+from gso.spelling import choices
 from gso.typing import Array, Ints
 from gso.verdict import Code
 
@@ -22,6 +23,42 @@ _AVOID, _FOLLOW = 20.0, 0.2
 STAYS, CHANGES = 0.01, 0.001
 #: Smallest neck, relative to the root of the area, unless given.
 NECK = 0.1
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many solves a search may take.
+
+    Attributes
+    ----------
+    divisions : int
+        How often pieces that do not hold what is allowed are divided, before more pieces are tried.
+    merges : int
+        How many solves merge pieces that do.
+    rounds : int
+        How often the design's own pieces are solved, each time with more of them.
+    """
+
+    divisions: int
+    merges: int
+    rounds: int
+
+
+#: By name, the fastest first.
+EFFORTS = {"draft": Effort(2, 0, 2), "standard": Effort(3, 4, 4), "best": Effort(4, 16, 6)}
+
+
+def effort_named(name: str) -> Effort:
+    """Return an effort by name.
+
+    Raises
+    ------
+    OptionError
+        There is none.
+    """
+    if name not in EFFORTS:
+        raise OptionError(f"no effort {name!r}; {choices(name, EFFORTS)}")
+    return EFFORTS[name]
 
 
 @dataclass(frozen=True)
@@ -37,6 +74,7 @@ class PieceSettings:
     min_size: float | None
     max_size: tuple[float, float] | None
     say: Callable[[str], None]
+    effort: Effort = EFFORTS["standard"]
     executor: Executor = SERIAL
 
     def __post_init__(self) -> None:

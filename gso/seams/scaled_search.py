@@ -39,24 +39,24 @@ _LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
 #: Numbers of patches, and how much compact pieces are preferred.
 _PATCHES, _COMPACT = (100, 200), (2.0, 5.0)
 #: Share of the area in pieces that do not hold, or largest excess of these, up to which they alone
-#: are divided, and how often.
-_FEW, _LITTLE, _DIVISIONS = 0.4, 1.5, 3
+#: are divided.
+_FEW, _LITTLE = 0.4, 1.5
 #: Range of the factor on the bound of a piece that is divided.
 _SMALLER = (0.35, 0.8)
 #: Width of the diffusion that makes boundaries fair, in mean edges of the copy.
 _WIDTH = 1.5
 #: Factor on the cost of seams along creases.
 _CREASE = 0.3
-#: Rounds of merges, share of the pieces that take part in one, and the largest estimate.
-_MERGES, _SHARE, _LIKELY = 3, 0.25, 1.5
+#: Share of the pieces that take part in a round of merges, and the largest estimate.
+_SHARE, _LIKELY = 0.25, 1.5
 #: Angle defect, in degrees, from which on a vertex is the apex of a cone.
 _APEX = 60.0
 #: Area of a region over the mean, below which it goes to a neighbour at first.
 _SMALL = 0.08
 #: Iterations of the solve of the design, from the shape of the copy.
 _ITERATIONS = 16
-#: How often these are solved again where they nearly hold, and regions divided where they do not.
-_REPAIRS, _ROUNDS = 3, 4
+#: How often these are solved again where they nearly hold.
+_REPAIRS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,13 +238,13 @@ def _of_copy(search: _Search) -> Trial:
         label = search.divided(level)
         if found and label.max() == found[-1].label.max():
             continue
-        for number in range(_DIVISIONS + 1):
+        for number in range(search.settings.effort.divisions + 1):
             say(f"seams and shape, attempt {len(found) + 1}: {label.max() + 1} pieces")
             found.append(search.measured(label))
             excess = found[-1].of_regions()
             area = np.bincount(label, search.regions.face_area)
             few = area[excess > 1.0].sum() <= _FEW * area.sum() or excess.max() <= _LITTLE
-            if found[-1].holds or not few or number == _DIVISIONS:
+            if found[-1].holds or not few or number == search.settings.effort.divisions:
                 break
             label = search.smaller(found[-1], excess)
         if found[-1].holds:
@@ -261,11 +261,13 @@ def _rank(trial: Trial, settings: PieceSettings) -> tuple[float, ...]:
 def _merged(search: _Search, best: Trial) -> Trial:
     """Merge neighbours as long as all pieces hold what is allowed."""
     forbidden: set[tuple[bytes, bytes]] = set()
-    for _ in range(_MERGES):
+    solves = search.settings.effort.merges
+    while solves > 0:
         pairs = _pairs(search, best, forbidden)
         if not pairs:
             break
-        while pairs:
+        while pairs and solves > 0:
+            solves -= 1
             search.settings.say(f"{len(best.pieces)} pieces, without {len(pairs)} of them")
             trial = search.measured(_joined(search, best.label, pairs))
             if trial.holds:
@@ -330,7 +332,8 @@ def _of_design(search: _Search, trial: Trial) -> Trial:
     copy, settings = search.copy, search.settings
     base = Regions(copy.smooth, copy.creases)
     found: list[Trial] = []
-    for number in range(_ROUNDS):
+    rounds = settings.effort.rounds
+    for number in range(rounds):
         settings.say(f"the design's own pieces, attempt {number + 1}")
         fields = base_fields(base, search.regions, copy, trial.label, search.width)
         divided = base.cut_between(fields)
@@ -350,7 +353,7 @@ def _of_design(search: _Search, trial: Trial) -> Trial:
             executor=settings.executor,
         )
         found.append(own)
-        if own.holds or number == _ROUNDS - 1:
+        if own.holds or number == rounds - 1:
             break
         excess = np.maximum(own.of_regions(), trial.of_regions())
         trial = search.measured(search.smaller(trial, excess))

@@ -33,7 +33,7 @@ from gso.seams.design_noise import noise
 from gso.seams.exact_pieces import exact_pieces
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
-from gso.seams.options import CHANGES, STAYS, PieceSettings, prices, too_large
+from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, prices, too_large
 from gso.seams.reshaping import reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
@@ -75,6 +75,7 @@ def pieces(
     avoid: ArrayLike | None = None,
     denoise: bool = False,
     as_it_is: bool = True,
+    effort: str = "standard",
     workers: int | None = None,
     callback: Callable[[str], None] | None = None,
 ) -> Segmentation:
@@ -130,6 +131,9 @@ def pieces(
     as_it_is : bool
         Ask first whether the design is developable as it is. Symmetric seams, and seams `along`
         edges or away from faces, are searched for in any case.
+    effort : {"draft", "standard", "best"}
+        How long to search where the shape of a triangle mesh may change, without darts: a first
+        look, the usual, or for fewer pieces.
     workers : int, optional
         Number of processes, which a search with `max_deviation` uses; one for each processor by
         default, 0 for this one alone. The result does not depend on it.
@@ -184,6 +188,7 @@ def pieces(
         min_size=length(min_size, "min_size"),
         max_size=as_sheet(sheet, unit),
         say=callback or (lambda said: None),
+        effort=effort_named(effort),
     )
     design, kept = _read(design, keep, denoise)
     factor = prices(design, along, avoid)
