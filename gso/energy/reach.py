@@ -1,8 +1,8 @@
 """Distance from a reference surface over how far each vertex may be away.
 
-Before every linearisation a vertex gets the closest point of the surface and the tangent plane there
-(iterated closest points, as in :func:`gso.energy.proximity.closest`), as long as that is near the
-vertex's own point of reference. Held vertices keep theirs.
+Before every linearisation a vertex gets the closest point of the surface and the tangent plane
+there (iterated closest points, as in :func:`gso.energy.proximity.closest`), as long as that is near
+the vertex's own point of reference. Held vertices keep theirs.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ def build(mesh: Mesh, normals: Array, limits: Array, held: Flags) -> Term:
 
     def refresh(blocks: Mapping[str, Array]) -> Array:
         feet = near.feet(blocks["surface"])
-        slid = np.linalg.norm(feet.points - mesh.vertices, axis=1) <= _SLIDE * limits
+        slid: Flags = np.linalg.norm(feet.points - mesh.vertices, axis=1) <= _SLIDE * limits
         slid &= np.einsum("nd,nd->n", feet.normals, normals) > _ALIKE
         slid &= ~held
-        out = constants.copy()
+        out: Array = constants.copy()
         out[:3, slid], out[3:6, slid] = feet.points[slid].T, feet.normals[slid].T
         return out
 

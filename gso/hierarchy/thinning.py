@@ -60,8 +60,8 @@ def thinned(
 ) -> Thinned:
     """Remove vertices of a triangle mesh until about `count` remain.
 
-    Boundary vertices are removed along the boundary only; its corners stay. So are those of lines. More than `count`
-    vertices remain where no other one can be removed without folding a triangle.
+    Boundary vertices are removed along the boundary only; its corners stay. So it is with lines.
+    More than `count` vertices remain where no other one can be removed without folding a triangle.
 
     Parameters
     ----------

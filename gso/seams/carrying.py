@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import diags
 
 from gso.cut_pieces import Pieces
 from gso.linalg import spd
@@ -36,11 +36,11 @@ def _copies(base: Regions, coarse: Regions, copy: CoarseCopy) -> Ints:
     At creases it is the one with the nearest normal.
     """
     count = len(coarse.opened.vertex)
-    vertex = copy.ids[coarse.opened.vertex]
+    vertex: Ints = copy.ids[coarse.opened.vertex]
     if not len(copy.creases):
         return vertex
     order = np.argsort(base.opened.vertex, kind="stable")
-    first = np.searchsorted(base.opened.vertex[order], np.r_[vertex, vertex + 1])
+    first: Ints = np.searchsorted(base.opened.vertex[order], np.r_[vertex, vertex + 1])
     number = first[count:] - first[:count]
     which = np.repeat(np.arange(count), number)
     place = np.arange(len(which)) - np.repeat(np.cumsum(number) - number, number)

@@ -90,7 +90,7 @@ class Regions:
         """Area of each face (m,)."""
         mesh = self.mesh
         vectors = geometry.area_vectors(mesh.vertices, mesh.faces)
-        return 0.5 * np.linalg.norm(vectors, axis=1)
+        return np.asarray(0.5 * np.linalg.norm(vectors, axis=1))
 
     @cached_property
     def _stiffness(self) -> csr_matrix:
@@ -116,10 +116,9 @@ class Regions:
         """Return the area (p, k) of each region at the vertices of the opened mesh."""
         faces, count = self.opened.mesh.faces, int(label.max()) + 1
         third = np.repeat(self.face_area / 3.0, 3)
-        return coo_matrix(
-            (third, (faces.ravel(), np.repeat(label, 3))),
-            shape=(len(self.opened.vertex), count),
-        ).toarray()
+        places = faces.ravel(), np.repeat(label, 3)
+        sums = coo_matrix((third, places), shape=(len(self.opened.vertex), count))
+        return np.asarray(sums.toarray())
 
     def fields(self, label: Ints, width: float) -> Array:
         """Return the diffused indicator functions (p, k) of regions, labels of faces (m,)."""
@@ -181,7 +180,7 @@ class Regions:
 
         def at(vertex: Ints) -> Array:
             place = (own == vertex[:, None]).argmax(axis=1)
-            return fields[copies[np.arange(len(own)), place]]
+            return np.asarray(fields[copies[np.arange(len(own)), place]])
 
         for corner in faces.T:
             old = corner < n

@@ -9,13 +9,11 @@ and its pieces are solved from the shape of the copy.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
-from gso import metrics
 from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
 from gso.seams.candidates import disks
@@ -29,8 +27,8 @@ from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
 from gso.seams.regions import Divided, Regions, numbered, seam_edges
 from gso.seams.tree import Ground
-from gso.seams.trial import Allowed, Trial, options_for, tried
-from gso.typing import Array, Flags, Ints
+from gso.seams.trial import Allowed, Trial, tried
+from gso.typing import Array, Ints
 
 #: Share of what is allowed that pieces of the copy may use.
 _ROOM = 0.95
@@ -53,6 +51,8 @@ _SHARE, _LIKELY = 0.25, 1.5
 _APEX = 60.0
 #: Area of a region over the mean, below which it goes to a neighbour at first.
 _SMALL = 0.08
+#: Area of a region over the whole below which it always goes to a neighbour.
+_TINY = 0.003
 #: Iterations of the solve of the design, from the shape of the copy.
 _ITERATIONS = 16
 #: How often these are solved again where they nearly hold.
@@ -113,7 +113,7 @@ class _Search:
         for label in self.first_patches:
             for compact in _COMPACT:
                 own = self.regions.fair(self.merged(label, bound, compact), self.width)
-                found.append(self.without_small(own))
+                found.append(self.without_small(own, _SMALL))
         return min(found, key=self.value)
 
     def value(self, label: Ints) -> tuple[int, float, float]:
@@ -123,18 +123,19 @@ class _Search:
         size = float(np.sqrt(self.regions.face_area.sum()))
         return self.settings.value(int(label.max()) + 1, float(length.sum()) / size)
 
-    def without_small(self, label: Ints) -> Ints:
-        """Merge regions that are much smaller than the others with their neighbours."""
+    def without_small(self, label: Ints, share: float = 0.0) -> Ints:
+        """Merge small regions with their neighbours.
+
+        They are smaller than a share of the mean, or so small that nobody would cut them.
+        """
         area, mesh = self.regions.face_area, self.copy.mesh
         while True:
             size = np.bincount(label, area)
-            small = np.flatnonzero(size < _SMALL * size.mean())
+            small = np.flatnonzero(size < max(share * size.mean(), _TINY * size.sum()))
             he = mesh.half_edges
             k = he.interior
             a, b = label[he.face[k]], label[he.face[he.twin[k]]]
-            length = np.linalg.norm(
-                mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1
-            )
+            length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
             for own in small[np.argsort(size[small], kind="stable")].tolist():
                 beside = np.bincount(
                     np.r_[b[(a == own) & (b != own)], a[(b == own) & (a != own)]],
@@ -159,6 +160,7 @@ class _Search:
             pieces,
             self.copy.mesh,
             allowed,
+            repairs=_REPAIRS - 1,
             executor=self.settings.executor,
         )
 
@@ -199,12 +201,10 @@ class _Search:
         finer = patches(mesh, max(_PATCHES[-1], 4 * len(excess)), kept)
         start = numbered(np.where(bad[label], finer + len(excess), label))
         new = self.merged(start, level, _COMPACT[0])
-        return self.regions.fair(new, self.width, rounds=1)
+        return self.without_small(self.regions.fair(new, self.width, rounds=1))
 
 
-def divided_within(
-    design: Mesh, settings: PieceSettings, kept: Ints
-) -> Trial:
+def divided_within(design: Mesh, settings: PieceSettings, kept: Ints) -> Trial:
     """Find few pieces of a triangle mesh that become developable within a distance.
 
     Parameters
@@ -314,7 +314,7 @@ def _pairs(
         if found is not None and found <= _LIKELY:
             ranked.append((found, a_, b_))
     used: set[int] = set()
-    out = []
+    out: list[tuple[int, int]] = []
     for _, one, two in sorted(ranked):
         if len(out) >= max(1, round(_SHARE * (label.max() + 1))):
             break

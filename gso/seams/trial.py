@@ -282,7 +282,7 @@ def untangled(shape: Pieces, folded: Ints) -> Array:
         moved[free] = (inner @ points)[free]
         moved[seam] = (along @ points)[seam]
         points = 0.5 * (points + moved)
-    return points
+    return np.asarray(points)
 
 
 def _strain(mesh: Mesh) -> float:

@@ -10,7 +10,8 @@ lines, which lets a surface become developable. The angle defects of holes that 
 the plane count as curvature, too. Second derivatives are relative to a share of the design's
 own, which is large where the design is developable. d penalises the displacement
 from the design, its tangential part less: quadratically below `quadratic_below`, linearly
-beyond. The elongation of an edge is zero within a range of length ratios.
+beyond. The elongation of an edge is zero within a range of length ratios. With `reach` there is
+``w_reach / 2 mean (distance beyond the reach)^2``, too.
 
 |K| is the mean over the angle defects of both triangulations of quads. Where coarse quads hide
 curvature from both, a share of its weight goes to |K| by the normals of quads.
@@ -24,7 +25,16 @@ import numpy as np
 
 from gso import metrics as measure
 from gso.components import several
-from gso.energy import Weighted, curvature, elongation, fairness, gauss_image, holonomy, proximity, reach
+from gso.energy import (
+    Weighted,
+    curvature,
+    elongation,
+    fairness,
+    gauss_image,
+    holonomy,
+    proximity,
+    reach,
+)
 from gso.energy.losses import Absolute, Beyond, Distance
 from gso.geometry import area_vectors
 from gso.hierarchy import resample
@@ -51,9 +61,9 @@ BOUNDED = (4.5, 3.0, 0.3)
 #: The mean of squared second differences along both polylines of quads is twice that across the
 #: edges of triangles, in the mean over all directions.
 _QUADS = 2.0
-#: Radii of balls over the reach, the distance of their centres from the surface over the radius from
-#: which on they count as empty, the reach over the radius, the least reach of a vertex, and the
-#: cosine of the angle between normals of both sides.
+#: Radii of balls over the reach, the distance of their centres from the surface over the radius
+#: from which on they count as empty, the reach over the radius, the least reach of a vertex, and
+#: the cosine of the angle between normals of both sides.
 _RADII, _EMPTY, _OF_RADIUS, _THINNEST = (0.5, 1.0, 1.5, 2.0), 0.85, 0.5, 0.2
 _OPPOSITE = -0.5
 #: Defect in degrees up to which an inner outline counts as a hole, as where patterns are cut open;
@@ -153,11 +163,11 @@ def _limits(mesh: Mesh, normals: Array, most: float) -> Array:
             other = np.einsum("nd,nd->n", facing[triangle], normals) < _OPPOSITE
             empty &= (away >= _EMPTY * radius * most) | ~other
         out = np.maximum(out, np.where(empty, _OF_RADIUS * radius, 0.0))
-    return most * np.minimum(out, 1.0)
+    return np.asarray(most * np.minimum(out, 1.0))
 
 
 def _rim(mesh: Mesh) -> Flags:
-    """Mark the vertices (n,) of boundary edges that are no seam: no other one is at the same place."""
+    """Mark the vertices (n,) of boundary edges that are no seams: no other edge is there."""
     ends = mesh.edges[mesh.boundary_edges]
     _, place = np.unique(mesh.vertices[ends.ravel()], axis=0, return_inverse=True)
     pairs = np.sort(place.reshape(ends.shape), axis=1)

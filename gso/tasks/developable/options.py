@@ -37,8 +37,8 @@ class Options(BaseOptions):
     w_proximity : float
         Weight of the displacement from the design.
     reach : float, optional
-        Displacements along normals, and any of the boundary without seams, are penalised beyond this by the
-        square of the excess; in the design's unit.
+        Distances from the design beyond this, and displacements of its boundary, are penalised by
+        the square of the excess; less where the design is thin. In the design's unit.
     w_reach : float
         Weight of that.
     w_elongation : float
