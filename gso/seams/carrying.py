@@ -40,7 +40,7 @@ def _copies(base: Regions, coarse: Regions, copy: CoarseCopy) -> Ints:
     if not len(copy.creases):
         return vertex
     order = np.argsort(base.opened.vertex, kind="stable")
-    first: Ints = np.searchsorted(base.opened.vertex[order], np.r_[vertex, vertex + 1])
+    first = np.asarray(np.searchsorted(base.opened.vertex[order], np.r_[vertex, vertex + 1]))
     number = first[count:] - first[:count]
     which = np.repeat(np.arange(count), number)
     place = np.arange(len(which)) - np.repeat(np.cumsum(number) - number, number)
@@ -50,7 +50,7 @@ def _copies(base: Regions, coarse: Regions, copy: CoarseCopy) -> Ints:
     alike = np.einsum("kd,kd->k", own[which], others[candidate])
     rank = np.lexsort([alike, which])
     last = rank[np.r_[which[rank][1:] != which[rank][:-1], True]]
-    return candidate[last]
+    return np.asarray(candidate[last])
 
 
 def base_start(copy: CoarseCopy, trial: Trial, pieces: Pieces) -> Array:

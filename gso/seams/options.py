@@ -45,7 +45,7 @@ class Effort:
 
 
 #: By name, the fastest first.
-EFFORTS = {"draft": Effort(2, 0, 2), "standard": Effort(3, 4, 4), "best": Effort(4, 16, 6)}
+EFFORTS = {"draft": Effort(2, 0, 2), "standard": Effort(3, 8, 4), "best": Effort(4, 24, 6)}
 
 
 def effort_named(name: str) -> Effort:
