@@ -23,6 +23,7 @@ from gso.geometry.cells import (
     face_products,
     isometry_defect,
 )
+from gso.geometry.chain_turns import chain_turns
 from gso.geometry.closing import Closing, closing
 from gso.geometry.depth_buffer import in_front, nearest_triangles, roomiest_pixels
 from gso.geometry.differences import second_difference
@@ -59,6 +60,7 @@ __all__ = [
     "area_vectors",
     "ball",
     "box_diagonal",
+    "chain_turns",
     "closest_motion",
     "closing",
     "corner_angles",

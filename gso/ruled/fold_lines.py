@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry import chain_turns
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
@@ -52,13 +53,7 @@ class Folds:
         vertices : ndarray, (n, 3)
             The mesh's vertices.
         """
-        ends = np.concatenate([self.edges, self.edges[:, ::-1]])
-        ends = ends[np.argsort(ends[:, 0], kind="stable")]
-        at, first, count = np.unique(ends[:, 0], return_index=True, return_counts=True)
-        inner = first[count == 2]
-        one, two = (vertices[ends[inner + k, 1]] - vertices[at[count == 2]] for k in (0, 1))
-        cosine = -np.einsum("kd,kd->k", unit(one), unit(two))
-        return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        return chain_turns(self.edges, vertices)
 
 
 def bend_radii(ends: Ints, widths: Array, angles: Array) -> Array:

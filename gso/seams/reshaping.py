@@ -54,7 +54,7 @@ class _Attempt:
 def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result | None]:
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
-    scaled = ground.mesh.is_triangles and not settings.darts and ground.mirror is None
+    scaled = ground.mesh.is_triangles and ground.mirror is None
     if scaled and ground.factor is None:
         trial = divided_within(ground.mesh, settings, ground.kept)
         return _patterns(ground, trial.shape, settings), trial.result

@@ -8,6 +8,7 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
+from gso.geometry import chain_turns
 from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.result import Result
@@ -63,6 +64,9 @@ def packed(
         some = [names[k] for k in joined]
         measured[Code.SMALL] = Measurement(areas / size**2, "piece", some)
         measured[Code.NARROW] = Measurement(widths / given.size, "piece", some)
+    turn = float(np.degrees(chain_turns(own.edges, own.design.vertices)).sum())
+    along = 100.0 * float(own.lengths.sum()) / own.design.diagonal
+    numbers["seam_turn"] = turn / along if along > 0 else 0.0
     notes = []
     if result is None:
         measured |= crossed(given)

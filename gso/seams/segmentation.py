@@ -29,10 +29,11 @@ class Segmentation(Pieces):
     metrics : dict
         ``pieces``, ``seam`` (relative to the root of the area), ``strain_p99`` and ``strain_max``
         (of the worst piece), ``neck`` (the narrowest place, in the mesh's unit), ``neck_share``
-        (the least ratio of a piece's narrowest place and the root of its area), and after a
-        change of shape ``deviation_mean`` and ``deviation_max`` (in the mesh's unit) and
-        ``dihedral_mean`` with ``dihedral_mean_before`` and ``dihedral_max`` (degrees, inside
-        pieces), and ``nonplanarity_max`` on quads (distance of the diagonals over the mean edge).
+        (the least ratio of a piece's narrowest place and the root of its area), and ``seam_turn``
+        (degrees by which seams turn, per cent of the diagonal along them). After a change of shape
+        ``deviation_mean`` and ``deviation_max`` (in the mesh's unit), ``dihedral_mean`` with
+        ``dihedral_mean_before`` and ``dihedral_max`` (degrees, inside pieces), and on quads
+        ``nonplanarity_max`` (distance of the diagonals over the mean edge).
     reasons : tuple of Reason
         Why it is not usable as what was asked for, the most severe first; empty if it is.
     notes : tuple of str

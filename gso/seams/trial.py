@@ -154,7 +154,7 @@ def tried(
         Number of iterations from there.
     options : Options, optional
     repairs : int
-        How often a result that nearly holds is solved again; twice as often where little is missing.
+        How often a result that nearly holds is solved again; twice as often if little is missing.
     executor : Executor
         Lays pieces flat; the result does not depend on it.
     """
