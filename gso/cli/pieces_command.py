@@ -38,6 +38,14 @@ if TYPE_CHECKING:
 @shared.sheet
 @shared.keep_groups
 @click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
+@click.option(
+    "--effort",
+    type=click.Choice(("draft", "standard", "best")),
+    default="standard",
+    show_default=True,
+    help="How long to search with --max-deviation on triangles: a first look, the usual, or for "
+    "fewer pieces.",
+)
 @shared.unit
 @shared.workers
 @file_options.weld

@@ -20,6 +20,8 @@ from gso.typing import Array, Flags, S, Vec
 #: How far a closest point may be from the vertex's own point of reference, over its limit, and the
 #: least cosine between normals; otherwise it may be on another part of the surface.
 _SLIDE, _ALIKE = 1.5, 0.5
+#: Factor on the tangential part of the displacement of those.
+_BACK = 0.3
 #: The reference does not move with the surface.
 INVARIANT = ()
 
@@ -56,6 +58,8 @@ def build(mesh: Mesh, normals: Array, limits: Array, held: Flags) -> Term:
         slid &= np.einsum("nd,nd->n", feet.normals, normals) > _ALIKE
         slid &= ~held
         out: Array = constants.copy()
+        # Whatever slid farther is drawn back.
+        out[6, ~slid & ~held] = _BACK
         out[:3, slid], out[3:6, slid] = feet.points[slid].T, feet.normals[slid].T
         return out
 

@@ -16,6 +16,7 @@ from gso import metrics
 from gso.hierarchy.thinning import flipped, thinned
 from gso.linalg import spd
 from gso.mesh import Mesh
+from gso.mesh.cut import cut
 from gso.mesh.slicing import divided
 from gso.seams.crease_lines import crease_lines
 from gso.seams.distance_estimate import largest_curvatures
@@ -25,7 +26,9 @@ from gso.typing import Ints
 #: Share of the distance that smoothing may use.
 _SMOOTH = 0.3
 #: Edge of the copy over the distance, and least and most vertices of a copy.
-_EDGE, _FEWEST, _MOST = 1.35, 700, 1700
+_EDGE, _FEWEST, _MOST = 1.35, 500, 1700
+#: Number of vertices of a copy over those of a coarse design.
+_FINER = 3
 #: Factor on the number of vertices where the surface is round, and the curvature over that of a
 #: ball of the distance from which on it is.
 _FINE, _ROUND = 3, 0.4
@@ -69,15 +72,13 @@ class CoarseCopy:
     lines: Ints
 
 
-def coarse_copy(design: Mesh, distance: float, kept: Ints | None = None) -> CoarseCopy:
+def coarse_copy(design: Mesh, distance: float) -> CoarseCopy:
     """Make the copy of a design for an allowed distance.
 
     Parameters
     ----------
     design : Mesh
     distance : float
-    kept : ndarray of int, (k, 2), optional
-        Edges that count as creases.
 
     Examples
     --------
@@ -90,23 +91,22 @@ def coarse_copy(design: Mesh, distance: float, kept: Ints | None = None) -> Coar
     triangles = Mesh(design.vertices, design.triangles, attributes=design.attributes)
     area = metrics.area(triangles)
     count = int(np.clip(area / (0.866 * (_EDGE * distance) ** 2), _FEWEST, _MOST))
+    count = min(count, max(_FEWEST, _FINER * int(design.used.sum())))
     step = float(np.sqrt(area / (0.866 * count)))
     base = with_short_edges(triangles, _LONG * step)
     creases = crease_lines(base, _CREASE * distance)
-    if kept is not None and len(kept):
-        creases = np.unique(np.sort(np.concatenate([creases, kept]), axis=1), axis=0)
     smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
     thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
     fine = Mesh(smooth.vertices[thin.ids], thin.faces)
-    own = thinned(fine.vertices, fine.faces, count, _narrow(fine, distance), thin.lines)
+    own = thinned(fine.vertices, fine.faces, count, _narrow(fine, thin.lines, distance), thin.lines)
     mesh, ids = Mesh(fine.vertices[own.ids], own.faces), thin.ids[own.ids]
     return CoarseCopy(base, smooth, creases, mesh, ids, own.lines)
 
 
-def _narrow(mesh: Mesh, distance: float) -> Ints:
+def _narrow(mesh: Mesh, creases: Ints, distance: float) -> Ints:
     """Return the vertices where the surface is so round that coarser triangles would cut it."""
-    bent = largest_curvatures(mesh) * distance > _ROUND
-    return np.unique(mesh.faces[bent])
+    bent = largest_curvatures(cut(mesh, creases).mesh) * distance > _ROUND
+    return np.setdiff1d(mesh.faces[bent], creases)
 
 
 def with_short_edges(mesh: Mesh, longest: float) -> Mesh:

@@ -35,6 +35,8 @@ _STRONGER = 4.0
 _HOPELESS, _NEARER, _FAR = 20.0, 6, 4.0
 #: Factors on the weights of fairness and curvature where pieces have facets or folds.
 _FAIRER = (3.0, 2.0)
+#: Number of vertices of a triangle mesh from which on a copy of it is searched.
+_FINE = 1000
 #: How often these are tried, and what a folded face adds to the excess.
 _FAIR, _FOLD = 2, 0.01
 
@@ -54,9 +56,8 @@ class _Attempt:
 def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result | None]:
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
-    scaled = ground.mesh.is_triangles and ground.mirror is None
-    if scaled and ground.factor is None:
-        trial = divided_within(ground.mesh, settings, ground.kept)
+    if _at_scale(ground):
+        trial = divided_within(ground.mesh, settings)
         return _patterns(ground, trial.shape, settings), trial.result
     tried: list[_Attempt] = []
     for level in _levels(tried, len(ground.kept)):
@@ -74,6 +75,12 @@ def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result
     )
     best = _with_straight_seams(ground, best, settings, allowed)
     return _patterns(ground, best.pieces, settings), best.result
+
+
+def _at_scale(ground: Ground) -> bool:
+    """Whether the search runs on a copy at the scale of the distance, which coarse designs are."""
+    free = ground.mirror is None and ground.factor is None and not len(ground.kept)
+    return free and ground.mesh.is_triangles and int(ground.mesh.used.sum()) >= _FINE
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:

@@ -41,6 +41,8 @@ _PATCHES, _COMPACT = (100, 200), (2.0, 5.0)
 _FEW, _LITTLE = 0.4, 1.5
 #: Range of the factor on the bound of a piece that is divided.
 _SMALLER = (0.35, 0.8)
+#: Distance over the allowed one, and number of pieces, from which on a search is in vain.
+_HOPELESS, _MANY = 20.0, 150
 #: Width of the diffusion that makes boundaries fair, in mean edges of the copy.
 _WIDTH = 1.5
 #: Factor on the cost of seams along creases.
@@ -204,7 +206,7 @@ class _Search:
         return self.without_small(self.regions.fair(new, self.width, rounds=1))
 
 
-def divided_within(design: Mesh, settings: PieceSettings, kept: Ints) -> Trial:
+def divided_within(design: Mesh, settings: PieceSettings) -> Trial:
     """Find few pieces of a triangle mesh that become developable within a distance.
 
     Parameters
@@ -212,8 +214,6 @@ def divided_within(design: Mesh, settings: PieceSettings, kept: Ints) -> Trial:
     design : Mesh
     settings : PieceSettings
         Its `max_deviation` is given.
-    kept : ndarray of int, (k, 2)
-        Edges that seams prefer as they do creases.
 
     Returns
     -------
@@ -224,7 +224,7 @@ def divided_within(design: Mesh, settings: PieceSettings, kept: Ints) -> Trial:
         raise ValueError("the search within a distance needs max_deviation")
     settings.say("a copy at the scale of the distance")
     allowed = Allowed(settings.max_deviation, settings.max_strain)
-    copy = coarse_copy(design, allowed.distance, kept)
+    copy = coarse_copy(design, allowed.distance)
     search = _Search(design, copy, allowed, settings)
     best = _of_copy(search)
     return _of_design(search, best)
@@ -244,13 +244,23 @@ def _of_copy(search: _Search) -> Trial:
             excess = found[-1].of_regions()
             area = np.bincount(label, search.regions.face_area)
             few = area[excess > 1.0].sum() <= _FEW * area.sum() or excess.max() <= _LITTLE
-            if found[-1].holds or not few or number == search.settings.effort.divisions:
+            if (
+                found[-1].holds
+                or _hopeless(found[-1])
+                or not few
+                or number == search.settings.effort.divisions
+            ):
                 break
             label = search.smaller(found[-1], excess)
-        if found[-1].holds:
+        if found[-1].holds or _hopeless(found[-1]):
             break
     best = min(found, key=lambda one: _rank(one, search.settings))
     return _merged(search, best) if best.holds else best
+
+
+def _hopeless(trial: Trial) -> bool:
+    """Whether pieces are so far away, or so many, that a further search is in vain."""
+    return float(trial.distance.max()) > _HOPELESS or len(trial.pieces) > _MANY
 
 
 def _rank(trial: Trial, settings: PieceSettings) -> tuple[float, ...]:
@@ -353,7 +363,7 @@ def _of_design(search: _Search, trial: Trial) -> Trial:
             executor=settings.executor,
         )
         found.append(own)
-        if own.holds or number == rounds - 1:
+        if own.holds or _hopeless(own) or number == rounds - 1:
             break
         excess = np.maximum(own.of_regions(), trial.of_regions())
         trial = search.measured(search.smaller(trial, excess))

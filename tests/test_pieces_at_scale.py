@@ -1,0 +1,126 @@
+"""Pieces of fine triangle meshes within a distance: the search on a copy at its scale."""
+
+import numpy as np
+import pytest
+
+import gso
+from gso import metrics
+from gso.hierarchy.thinning import thinned
+from gso.mesh import Mesh, Nearest
+from gso.seams.coarse_copy import coarse_copy, with_short_edges
+from gso.seams.crease_lines import crease_lines
+from gso.seams.regions import Regions, seam_edges
+
+
+def ball(side: int) -> Mesh:
+    """Half an ellipsoid of triangles, with side^2 vertices."""
+    x, y = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side), indexing="ij")
+    grid = Mesh.from_grid(np.dstack([x, y, 0.8 * np.sqrt(2.2 - x**2 - y**2)]))
+    return Mesh(grid.vertices, grid.triangles)
+
+
+def roof(side: int, angle: float = 0.0) -> Mesh:
+    """Two planes that meet at a straight crease, turned by an angle."""
+    x, y = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side), indexing="ij")
+    grid = Mesh.from_grid(np.dstack([x, y, -np.abs(x)]))
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    return Mesh(grid.vertices @ turn.T, grid.triangles)
+
+
+class TestTheCopy:
+    def test_its_size_depends_on_the_distance_and_not_on_the_file(self):
+        copies = [coarse_copy(ball(side), 0.05).mesh for side in (60, 120)]
+        sizes = [len(copy.vertices) for copy in copies]
+        assert abs(sizes[0] - sizes[1]) < 0.05 * sizes[1]
+        assert len(coarse_copy(ball(120), 0.1).mesh.vertices) < 0.6 * sizes[1]
+
+    def test_it_lies_within_the_distance(self):
+        mesh = ball(90)
+        noise = np.random.default_rng(0).normal(0, 0.004, mesh.vertices.shape)
+        rough = mesh.replaced(mesh.vertices + noise)
+        copy = coarse_copy(rough, 0.05)
+        assert metrics.largest_distance(rough, copy.mesh) < 0.05
+        # The noise is smoothed.
+        bent = metrics.dihedral_angles(copy.smooth).mean()
+        assert bent < 0.4 * metrics.dihedral_angles(rough).mean()
+
+    def test_creases_stay_creases(self):
+        copy = coarse_copy(roof(61, 0.3), 0.05)
+        on = copy.mesh.vertices[copy.lines].reshape(-1, 3)
+        assert len(copy.lines) > 3
+        np.testing.assert_allclose(on[:, 2], 0.0, atol=1e-5)
+
+    def test_division_of_long_edges_keeps_the_shape(self):
+        box = Mesh(
+            [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1.0, 0], [0.5, 0.5, 1]],
+            [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+        )
+        fine = with_short_edges(box, 0.2)
+        assert fine.edge_lengths.max() <= 0.2
+        assert metrics.area(fine) == pytest.approx(metrics.area(box), rel=1e-12)
+        assert Nearest(box).distances(fine.vertices).max() < 1e-12
+
+    def test_lines_are_thinned_along_themselves(self):
+        mesh = roof(41)
+        lines = crease_lines(mesh, 1.0)
+        assert len(lines) == 40
+        thin = thinned(mesh.vertices, mesh.faces, 150, lines=lines)
+        ends = mesh.vertices[thin.ids][thin.lines]
+        assert 1 < len(thin.lines) < 40
+        np.testing.assert_allclose(ends[..., 0], 0.0, atol=1e-12)
+        length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+        assert length == pytest.approx(2.0)
+
+
+class TestRegions:
+    def test_a_zigzag_becomes_straight_and_divides_triangles(self):
+        x, y = np.meshgrid(np.linspace(0, 1, 31), np.linspace(0, 1, 31), indexing="ij")
+        grid = Mesh.from_grid(np.dstack([x, y, 0 * x]))
+        mesh = Mesh(grid.vertices, grid.triangles)
+        middle = mesh.vertices[mesh.faces].mean(axis=1)
+        zigzag = 0.5 + 0.03 * np.sign(np.sin(40 * middle[:, 1]))
+        regions = Regions(mesh, np.empty((0, 2), np.int64))
+        label = regions.fair((middle[:, 0] > zigzag).astype(np.int64), 0.06)
+        divided = regions.cut_between(regions.fields(label, 0.06))
+        ends = divided.mesh.vertices[seam_edges(divided.mesh, divided.label)]
+        length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+        assert length < 1.02
+        assert np.abs(ends[..., 0] - 0.5).max() < 0.04
+        assert metrics.area(divided.mesh) == pytest.approx(1.0)
+        # The same division of other points.
+        np.testing.assert_allclose(divided.moved(mesh.vertices), divided.mesh.vertices, atol=1e-12)
+
+    def test_boundaries_stay_on_creases(self):
+        mesh = roof(31)
+        middle = mesh.vertices[mesh.faces].mean(axis=1)
+        label = (middle[:, 0] > 0).astype(np.int64)
+        regions = Regions(mesh, crease_lines(mesh, 1.0))
+        divided = regions.cut_between(regions.fields(regions.fair(label, 0.2), 0.2))
+        ends = divided.mesh.vertices[seam_edges(divided.mesh, divided.label)]
+        np.testing.assert_allclose(ends[..., 0], 0.0, atol=1e-12)
+        assert len(divided.mesh.vertices) == len(mesh.vertices)
+
+
+class TestTheSearch:
+    def test_pieces_hold_the_distance_and_use_it(self):
+        mesh = ball(36)
+        allowed = 0.06
+        found = gso.pieces(mesh, max_deviation=allowed, effort="draft", workers=0)
+        assert found.usable, found.reasons
+        assert len(found) <= 5
+        assert 0.7 * allowed <= found.metrics["deviation_max"] <= allowed
+        assert found.metrics["strain_max"] <= 1e-3
+        assert found.metrics["neck_share"] > 0.1
+        assert found.metrics["seam_turn"] < 8.0
+        # By another route: middles of faces against the design, and of the design's against them.
+        for one, two in ((found.result.pieces.design, mesh), (mesh, found.result.pieces.design)):
+            middles = one.vertices[one.faces].mean(axis=1)
+            assert Nearest(two).distances(middles).max() <= 1.001 * allowed
+        for piece in found:
+            assert piece.is_disk
+
+    def test_an_unknown_effort_is_named(self):
+        with pytest.raises(gso.OptionError, match="no effort 'quick'"):
+            gso.pieces(ball(8), max_deviation=0.1, effort="quick")
