@@ -9,7 +9,7 @@ from gso.hierarchy.thinning import thinned
 from gso.mesh import Mesh, Nearest
 from gso.seams.coarse_copy import coarse_copy, with_short_edges
 from gso.seams.crease_lines import crease_lines
-from gso.seams.regions import Regions, seam_edges
+from gso.seams.regions import Regions, connected, seam_edges
 
 
 def ball(side: int) -> Mesh:
@@ -74,6 +74,13 @@ class TestTheCopy:
         assert length == pytest.approx(2.0)
 
 
+def seam_faces(mesh: Mesh, label: np.ndarray) -> np.ndarray:
+    """The faces with a vertex on a seam."""
+    on = np.zeros(len(mesh.vertices), bool)
+    on[seam_edges(mesh, label)] = True
+    return np.flatnonzero(on[mesh.faces].any(axis=1))
+
+
 class TestRegions:
     def test_a_zigzag_becomes_straight_and_divides_triangles(self):
         x, y = np.meshgrid(np.linspace(0, 1, 31), np.linspace(0, 1, 31), indexing="ij")
@@ -91,6 +98,16 @@ class TestRegions:
         assert metrics.area(divided.mesh) == pytest.approx(1.0)
         # The same division of other points.
         np.testing.assert_allclose(divided.moved(mesh.vertices), divided.mesh.vertices, atol=1e-12)
+
+    def test_single_faces_go_to_their_neighbours(self):
+        grid = Mesh.from_grid(np.dstack([*np.mgrid[:11.0, :11.0], np.zeros((11, 11))]))
+        mesh = Mesh(grid.vertices, grid.triangles)
+        half = (mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 5).astype(np.int64)
+        inside = np.flatnonzero(np.bincount(seam_faces(mesh, half), minlength=len(half)) == 0)
+        for face in inside:
+            label = half.copy()
+            label[face] = 1 - label[face]
+            assert (connected(mesh, label) == half).all()
 
     def test_boundaries_stay_on_creases(self):
         mesh = roof(31)
@@ -120,6 +137,11 @@ class TestTheSearch:
             assert Nearest(two).distances(middles).max() <= 1.001 * allowed
         for piece in found:
             assert piece.is_disk
+
+    @pytest.mark.parametrize("allowed", [1e-200, 3.0, 1e80])
+    def test_any_distance_has_a_copy(self, allowed):
+        copy = coarse_copy(ball(30), allowed)
+        assert 100 < len(copy.mesh.vertices) <= 2 * 30**2
 
     def test_an_unknown_effort_is_named(self):
         with pytest.raises(gso.OptionError, match="no effort 'quick'"):

@@ -80,14 +80,16 @@ class Beyond:
 
     limit: float
 
-    def _share(self, r: B) -> B:
-        length = ops.sqrt((r * r).sum(0)[None] + 1e-300)
-        return ops.maximum(1.0 - self.limit / length, 0.0)
+    def _length(self, r: B) -> B:
+        return ops.sqrt((r * r).sum(0)[None] + 1e-300)
+
+    def _excess(self, r: B) -> B:
+        return ops.maximum(self._length(r) - self.limit, 0.0)
 
     def value(self, r: B) -> B:
-        length = ops.sqrt((r * r).sum(0)[None] + 1e-300)
-        return 0.5 * (length * self._share(r)) ** 2
+        return 0.5 * self._excess(r) ** 2
 
     def weights(self, r: B) -> tuple[B, B]:
-        share = self._share(r)
-        return r * share, ops.like(r, ops.where(share > 0.0, 0.0 * share + 1.0, 0.0))
+        excess = self._excess(r)
+        active = ops.where(excess > 0.0, excess * 0.0 + 1.0, 0.0)
+        return r * (excess / self._length(r)), ops.like(r, active)

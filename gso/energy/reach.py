@@ -35,7 +35,7 @@ def residual(points: Sequence[Vec[S]], constants: Sequence[S]) -> Vec[S]:
 def build(mesh: Mesh, normals: Array, limits: Array, held: Flags) -> Term:
     """Build the distance of every vertex from a surface, over its limit.
 
-    Weights are those of the squared distance.
+    Weights are times the squared limit, so that the energy is of the distance itself.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def thinned(
     keep : ndarray of int, optional
         Vertices that are not removed.
     lines : ndarray of int, (k, 2), optional
-        Edges that form lines, such as creases. Their ends and junctions stay.
+        Edges of triangles that form lines, such as creases. Their ends and junctions stay.
 
     Examples
     --------

@@ -26,7 +26,8 @@ def base_fields(
     at = _copies(base, coarse, copy)
     masses = np.zeros((len(base.opened.vertex), int(label.max()) + 1))
     np.add.at(masses, at, coarse.masses(label))
-    fields = base.diffused(masses, width)
+    # Obtuse triangles may make values far from all masses slightly negative.
+    fields = np.maximum(base.diffused(masses, width), 0.0)
     return np.asarray(fields / np.maximum(fields.sum(axis=1, keepdims=True), 1e-300))
 
 

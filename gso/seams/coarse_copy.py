@@ -27,6 +27,8 @@ from gso.typing import Ints
 _SMOOTH = 0.3
 #: Edge of the copy over the distance, and least and most vertices of a copy.
 _EDGE, _FEWEST, _MOST = 1.35, 500, 1700
+#: Range of distances over the diagonal.
+_LEAST, _LARGEST = 1e-6, 0.1
 #: Number of vertices of a copy over those of a coarse design.
 _FINER = 3
 #: Factor on the number of vertices where the surface is round, and the curvature over that of a
@@ -88,6 +90,8 @@ def coarse_copy(design: Mesh, distance: float) -> CoarseCopy:
     >>> len(copy.mesh.vertices) < 0.5 * len(sheet.vertices), len(copy.lines)
     (True, 0)
     """
+    # Beyond that the copy would be no surface any more; the search measures by what was asked for.
+    distance = float(np.clip(distance, _LEAST * design.diagonal, _LARGEST * design.diagonal))
     triangles = Mesh(design.vertices, design.triangles, attributes=design.attributes)
     area = metrics.area(triangles)
     count = int(np.clip(area / (0.866 * (_EDGE * distance) ** 2), _FEWEST, _MOST))
@@ -122,7 +126,7 @@ def with_short_edges(mesh: Mesh, longest: float) -> Mesh:
         k = he.interior[metrics.dihedral_angles(mesh) > _BENT]
         bent = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1)
         faces = flipped(mesh.vertices, mesh.faces, bent)
-        mesh = Mesh(mesh.vertices, faces)
+        mesh = Mesh(mesh.vertices, faces, attributes=mesh.attributes)
     return mesh
 
 

@@ -127,7 +127,7 @@ class Regions:
     def fair(self, label: Ints, width: float, rounds: int = 2) -> Ints:
         """Make boundaries between regions fair; return the region of each face (m,).
 
-        Regions stay connected; those that vanish are left out.
+        Parts that are cut off go to other regions; regions that vanish are left out.
         """
         for _ in range(rounds):
             value = self.fields(label, width)[self.opened.mesh.faces].sum(axis=1)
@@ -257,21 +257,26 @@ def numbered(label: Ints) -> Ints:
 
 
 def connected(mesh: Mesh, label: Ints, value: Array | None = None) -> Ints:
-    """Give all but the largest part of each region to the neighbours.
+    """Give all but the largest part of each region to other regions.
 
-    Each face goes to the region with the largest value (m, k), or to that of a neighbour.
+    Each face of such a part goes to the region with the next largest value (m, k) if these are
+    given, or else to that of a neighbour.
     """
     he, label = mesh.half_edges, label.copy()
     k = he.interior
     f, g = he.face[k], he.face[he.twin[k]]
-    for _ in range(_ROUNDS):
+    f, g = np.r_[f, g], np.r_[g, f]
+    for number in range(_ROUNDS):
         bad = _fragments(label, f, g)
         if not bad.any():
             break
-        if value is not None:
-            value = value.copy()
+        if value is not None and number < _ROUNDS // 2:
+            # What is left after some rounds goes to neighbours.
+            value = np.where(value > 0.0, value, -np.inf)
             value[np.flatnonzero(bad), label[bad]] = -np.inf
-            label[bad] = value[bad].argmax(axis=1)
+            other = value[bad].argmax(axis=1)
+            known = np.isfinite(value[bad].max(axis=1))
+            label[np.flatnonzero(bad)[known]] = other[known]
             continue
         while bad.any():
             front = bad[f] & ~bad[g]

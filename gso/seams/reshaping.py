@@ -22,6 +22,8 @@ from gso.seams.tree import Ground
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 
+#: Number of vertices of a triangle mesh from which on a copy of it is searched.
+_MANY = 1000
 #: Bound on the estimated strain of the first cuts, the factor between attempts, and the ratio of a
 #: bound that is too large to one that is not at which the search ends.
 _FIRST, _STEP, _CLOSE = 0.04, 1.5, 1.1
@@ -35,8 +37,6 @@ _STRONGER = 4.0
 _HOPELESS, _NEARER, _FAR = 20.0, 6, 4.0
 #: Factors on the weights of fairness and curvature where pieces have facets or folds.
 _FAIRER = (3.0, 2.0)
-#: Number of vertices of a triangle mesh from which on a copy of it is searched.
-_FINE = 1000
 #: How often these are tried, and what a folded face adds to the excess.
 _FAIR, _FOLD = 2, 0.01
 
@@ -80,7 +80,7 @@ def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result
 def _at_scale(ground: Ground) -> bool:
     """Whether the search runs on a copy at the scale of the distance, which coarse designs are."""
     free = ground.mirror is None and ground.factor is None and not len(ground.kept)
-    return free and ground.mesh.is_triangles and int(ground.mesh.used.sum()) >= _FINE
+    return free and ground.mesh.is_triangles and int(ground.mesh.used.sum()) >= _MANY
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:

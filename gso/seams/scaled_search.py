@@ -46,7 +46,7 @@ _HOPELESS, _MANY = 20.0, 150
 #: Width of the diffusion that makes boundaries fair, in mean edges of the copy.
 _WIDTH = 1.5
 #: Factor on the cost of seams along creases.
-_CREASE = 0.3
+_CHEAPER = 0.3
 #: Share of the pieces that take part in a round of merges, and the largest estimate.
 _SHARE, _LIKELY = 0.25, 1.5
 #: Angle defect, in degrees, from which on a vertex is the apex of a cone.
@@ -76,7 +76,7 @@ class _Search:
         factor = None
         if len(lines):
             factor = np.ones(len(mesh.edges))
-            factor[mesh.edge_numbers(lines[:, 0], lines[:, 1])] = _CREASE
+            factor[mesh.edge_numbers(lines[:, 0], lines[:, 1])] = _CHEAPER
         return Ground.of(mesh, factor)
 
     @cached_property
@@ -181,8 +181,12 @@ class _Search:
         ground = Ground.of(mesh)
         reached = mesh.half_edges.boundary_vertex.copy()
         reached[edges] = True
+        own = mesh.components
         for apex in apexes.tolist():
-            if reached[apex] or not reached.any():
+            if not reached[own == own[apex]].any():
+                # The first apex of a closed component: the others are joined to it.
+                reached[apex] = True
+            if reached[apex]:
                 continue
             line = ground.paths.cheapest(apex, reached, np.ones(len(mesh.edges)))
             edges = np.concatenate([edges, np.stack([line[:-1], line[1:]], axis=1)])
@@ -251,7 +255,10 @@ def _of_copy(search: _Search) -> Trial:
                 or number == search.settings.effort.divisions
             ):
                 break
-            label = search.smaller(found[-1], excess)
+            finer = search.smaller(found[-1], excess)
+            if np.array_equal(finer, label):
+                break
+            label = finer
         if found[-1].holds or _hopeless(found[-1]):
             break
     best = min(found, key=lambda one: _rank(one, search.settings))
@@ -365,6 +372,8 @@ def _of_design(search: _Search, trial: Trial) -> Trial:
         found.append(own)
         if own.holds or _hopeless(own) or number == rounds - 1:
             break
-        excess = np.maximum(own.of_regions(), trial.of_regions())
-        trial = search.measured(search.smaller(trial, excess))
+        label = search.smaller(trial, np.maximum(own.of_regions(), trial.of_regions()))
+        if np.array_equal(label, trial.label):
+            break
+        trial = search.measured(label)
     return min(found, key=lambda one: _rank(one, settings))

@@ -110,13 +110,13 @@ class Trial:
         return self.pieces if solved is None else solved
 
 
-def options_for(allowed: Allowed, fairer: float = 1.0) -> Options:
+def options_for(allowed: Allowed) -> Options:
     """Return the settings of a joint solve within a distance."""
     own = Options().for_pieces()
     return replace(
         own,
-        w_fairness=_FAIR * fairer * own.w_fairness,
-        w_curvature=_CURVED * fairer * own.w_curvature,
+        w_fairness=_FAIR * own.w_fairness,
+        w_curvature=_CURVED * own.w_curvature,
         w_proximity=_NEAR * own.w_proximity,
         reach=_REACH * allowed.distance,
         w_reach=_WEIGHT,
@@ -131,7 +131,6 @@ def tried(
     allowed: Allowed,
     start: Array | None = None,
     iterations: int | None = None,
-    options: Options | None = None,
     repairs: int = 1,
     executor: Executor = SERIAL,
 ) -> Trial:
@@ -152,14 +151,13 @@ def tried(
         Points of the divided mesh to begin with.
     iterations : int, optional
         Number of iterations from there.
-    options : Options, optional
     repairs : int
         How often a result that nearly holds is solved again; twice as often if little is missing.
     executor : Executor
         Lays pieces flat; the result does not depend on it.
     """
-    own = options or options_for(allowed)
-    best: Trial | None = None
+    own = options_for(allowed)
+    found: list[Trial] = []
     for number in range(2 * repairs + 1):
         begin = Start(start, iterations=iterations if start is not None else None)
         asked = Request("developable", "curvature", own, start=begin, verdict=False)
@@ -170,8 +168,7 @@ def tried(
         # Flips change the areas of pieces, and so perhaps their order.
         region = divided.label[[part.faces[0] for part in pieces.parts]]
         trial = _measured(label, pieces, region, result, design, allowed, executor)
-        if best is None or trial.excess.max() < best.excess.max():
-            best = trial
+        found.append(trial)
         if trial.holds or result is None or not _repairable(trial):
             break
         if number >= repairs and trial.excess.max() > _CLOSE:
@@ -179,7 +176,7 @@ def tried(
         own = _stricter(own, trial)
         start, iterations = untangled(trial.shape, _folded(trial)), _AGAIN
         pieces = _with_flips(trial)
-    return best or trial
+    return min(found, key=lambda one: float(one.excess.max()))
 
 
 def _repairable(trial: Trial) -> bool:
@@ -256,7 +253,11 @@ def _with_flips(trial: Trial) -> Pieces:
     some = bad[f] & bad[g] & ~seam & (metrics.dihedral_angles(mesh) > _FOLDED)
     if not some.any():
         return trial.pieces
-    return cut(with_flips(design, k[some]), Edges(trial.pieces.edges))
+    try:
+        return cut(with_flips(design, k[some]), Edges(trial.pieces.edges))
+    except MeshError:
+        # A triangle would have no area.
+        return trial.pieces
 
 
 def untangled(shape: Pieces, folded: Ints) -> Array:
@@ -290,7 +291,7 @@ def untangled(shape: Pieces, folded: Ints) -> Array:
 
 
 def _strain(mesh: Mesh) -> float:
+    """Return the largest strain of a piece's pattern; infinite where there is none."""
     pattern = lay_out(mesh)
-    if pattern is None:
-        return np.inf
-    return metrics.strains(mesh, pattern.flat)["strain_max"]
+    found = np.inf if pattern is None else metrics.strains(mesh, pattern.flat)["strain_max"]
+    return found if np.isfinite(found) else np.inf

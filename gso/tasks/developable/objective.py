@@ -85,7 +85,8 @@ def objective(
     Several components are weighted each for its own size and curvature. `image` is the share of
     the weight of curvature for curvature by the normals of quads.
     """
-    if not request.options.by_component or not several(analysis.mesh):
+    whole = not request.options.by_component or request.options.reach is not None
+    if whole or not several(analysis.mesh):
         shape = analysis.shape
         if mesh is not shape.mesh and mesh.grid_index is None:
             request = _on_triangles(request, analysis)

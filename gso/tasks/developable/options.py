@@ -38,7 +38,8 @@ class Options(BaseOptions):
         Weight of the displacement from the design.
     reach : float, optional
         Distances from the design beyond this, and displacements of its boundary, are penalised by
-        the square of the excess; less where the design is thin. In the design's unit.
+        the square of the excess; less where the design is thin. In the design's unit; components
+        are then weighed as for the whole mesh.
     w_reach : float
         Weight of that.
     w_elongation : float
@@ -152,5 +153,7 @@ class Options(BaseOptions):
             )
         if self.controls < 4:
             raise OptionError(f"controls is {self.controls}; it must be 4 or more")
+        if self.reach == 0:
+            raise OptionError("reach is 0; give a distance, or max_deviation")
         if not (self.eps > 0 and self.quadratic_below > 0):
             raise OptionError("eps and quadratic_below must be positive")
