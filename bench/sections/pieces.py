@@ -9,6 +9,7 @@ NAME_vertices, NAME_faces) the designs of ``examples/whole.py`` are cut.
 from __future__ import annotations
 
 import importlib.util
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,34 @@ def joint(shapes: str = "") -> dict[str, Any]:
                 mesh, max_strain=_JOINT, max_deviation=far, darts=True
             )
     return tabulate(f"shape may change, strain {_JOINT}", ["design", ""], rows)
+
+
+def within(
+    shapes: str = "", files: str = "", share: str = "1.75", effort: str = "standard"
+) -> dict[str, Any]:
+    """Cut designs without darts whose shape may change within a share (%) of the diagonal.
+
+    ``files=A.obj,B.off`` names meshes to take instead; ``seam turn`` is in degrees per cent of the
+    diagonal, ``smallest %`` the area of the smallest piece over all.
+    """
+    given = [Path(name) for name in files.split(",") if name]
+    designs = [(path.stem, gso.as_mesh(path)) for path in given] or _shapes(shapes, "within")
+    rows: _Rows = {}
+    for name, mesh in designs:
+        far = 0.01 * float(share) * mesh.diagonal
+        asked = {"max_strain": _WHOLE, "max_deviation": far, "effort": effort}
+        found = quietly(gso.pieces, mesh, **asked)
+        row = _of_found(found, 100.0 / mesh.diagonal)
+        areas = [part.area for part in found.parts]
+        rows[name] = {
+            "triangles": len(mesh.triangles),
+            **{key: row[key] for key in ("pieces", "seam", "mean %", "max %", "p99", "neck")},
+            "smallest %": 100.0 * min(areas) / sum(areas),
+            "seam turn": found.metrics["seam_turn"],
+            "usable": row["usable"],
+            "s": row["s"],
+        }
+    return tabulate(f"within {share} %, {effort}", ["design"], rows)
 
 
 def ruled(shapes: str = "") -> dict[str, Any]:
@@ -133,8 +162,11 @@ def times() -> dict[str, Any]:
 
 
 def _figures(mesh: Mesh, **given: Any) -> dict[str, Any]:
-    found = quietly(gso.pieces, mesh, **given)
-    known, percent = found.metrics, 100.0 / mesh.diagonal
+    return _of_found(quietly(gso.pieces, mesh, **given), 100.0 / mesh.diagonal)
+
+
+def _of_found(found: gso.seams.Segmentation, percent: float) -> dict[str, Any]:
+    known = found.metrics
     before = known.get("dihedral_mean_before", np.nan)
     return {
         "pieces": len(found),
@@ -208,4 +240,4 @@ def _xatlas(mesh: Mesh) -> tuple[int, float, float]:
     return int(atlas.chart_count), seam, strain
 
 
-SECTIONS = (as_is, joint, ruled, uncut, minimax, times)
+SECTIONS = (as_is, joint, within, ruled, uncut, minimax, times)
