@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
@@ -25,6 +26,7 @@ from gso.seams.distance_estimate import DistanceEstimates
 from gso.seams.kinds import Edges
 from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
+from gso.seams.potential import Potential
 from gso.seams.regions import Divided, Regions, numbered, seam_edges
 from gso.seams.tree import Ground
 from gso.seams.trial import Allowed, Trial, tried
@@ -174,6 +176,22 @@ class _Search:
         sharp &= ~mesh.half_edges.boundary_vertex
         sharp[self.copy.lines] = False
         return np.flatnonzero(sharp)
+
+    @cached_property
+    def base_apexes(self) -> Ints:
+        """The sharpest vertices of the base near the apexes of the copy."""
+        base = self.copy.base
+        if not len(self.apexes):
+            return self.apexes
+        curvature = np.where(base.half_edges.boundary_vertex, -np.inf, Potential(base).curvature)
+        reach = float(self.copy.mesh.edge_lengths.mean())
+        near = cKDTree(base.vertices).query_ball_point(self.copy.mesh.vertices[self.apexes], reach)
+        own = self.copy.ids[self.apexes]
+        sharpest = [
+            max([int(vertex), *sorted(others)], key=lambda k: curvature[k])
+            for vertex, others in zip(own, near, strict=True)
+        ]
+        return np.unique(sharpest)
 
     def opened(self, divided: Divided, apexes: Ints) -> Pieces:
         """Cut between regions, to the apexes of cones, and until all pieces are disks."""
@@ -354,7 +372,7 @@ def _of_design(search: _Search, trial: Trial) -> Trial:
         settings.say(f"the design's own pieces, attempt {number + 1}")
         fields = base_fields(base, search.regions, copy, trial.label, search.width)
         divided = base.cut_between(fields)
-        smooth = search.opened(divided, copy.ids[search.apexes])
+        smooth = search.opened(divided, search.base_apexes)
         start = base_start(copy, trial, smooth)
         design = smooth.design.replaced(divided.moved(copy.base.vertices))
         pieces = cut(design, Edges(smooth.edges))
