@@ -5,11 +5,9 @@ import pytest
 
 import gso
 from gso import metrics
-from gso.hierarchy.thinning import thinned
+from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
-from gso.seams.coarse_copy import coarse_copy, with_short_edges
-from gso.seams.crease_lines import crease_lines
-from gso.seams.regions import Regions, connected, seam_edges
+from gso.seams import CoarseCopy, Creases, Regions
 
 
 def ball(side: int) -> Mesh:
@@ -31,23 +29,23 @@ def roof(side: int, angle: float = 0.0) -> Mesh:
 
 class TestTheCopy:
     def test_its_size_depends_on_the_distance_and_not_on_the_file(self):
-        copies = [coarse_copy(ball(side), 0.05).mesh for side in (60, 120)]
+        copies = [CoarseCopy.of(ball(side), 0.05).mesh for side in (60, 120)]
         sizes = [len(copy.vertices) for copy in copies]
         assert abs(sizes[0] - sizes[1]) < 0.05 * sizes[1]
-        assert len(coarse_copy(ball(120), 0.1).mesh.vertices) < 0.6 * sizes[1]
+        assert len(CoarseCopy.of(ball(120), 0.1).mesh.vertices) < 0.6 * sizes[1]
 
     def test_it_lies_within_the_distance(self):
         mesh = ball(90)
         noise = np.random.default_rng(0).normal(0, 0.004, mesh.vertices.shape)
         rough = mesh.replaced(mesh.vertices + noise)
-        copy = coarse_copy(rough, 0.05)
+        copy = CoarseCopy.of(rough, 0.05)
         assert metrics.largest_distance(rough, copy.mesh) < 0.05
         # The noise is smoothed.
         bent = metrics.dihedral_angles(copy.smooth).mean()
         assert bent < 0.4 * metrics.dihedral_angles(rough).mean()
 
     def test_creases_stay_creases(self):
-        copy = coarse_copy(roof(61, 0.3), 0.05)
+        copy = CoarseCopy.of(roof(61, 0.3), 0.05)
         on = copy.mesh.vertices[copy.lines].reshape(-1, 3)
         assert len(copy.lines) > 3
         np.testing.assert_allclose(on[:, 2], 0.0, atol=1e-5)
@@ -57,14 +55,14 @@ class TestTheCopy:
             [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1.0, 0], [0.5, 0.5, 1]],
             [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
         )
-        fine = with_short_edges(box, 0.2)
+        fine = CoarseCopy.of(box, 0.1).base
         assert fine.edge_lengths.max() <= 0.2
         assert metrics.area(fine) == pytest.approx(metrics.area(box), rel=1e-12)
         assert Nearest(box).distances(fine.vertices).max() < 1e-12
 
     def test_lines_are_thinned_along_themselves(self):
         mesh = roof(41)
-        lines = crease_lines(mesh, 1.0)
+        lines = Creases(35.0).edges(mesh)
         assert len(lines) == 40
         thin = thinned(mesh.vertices, mesh.faces, 150, lines=lines)
         ends = mesh.vertices[thin.ids][thin.lines]
@@ -72,6 +70,14 @@ class TestTheCopy:
         np.testing.assert_allclose(ends[..., 0], 0.0, atol=1e-12)
         length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
         assert length == pytest.approx(2.0)
+
+
+def seam_edges(mesh: Mesh, label: np.ndarray) -> np.ndarray:
+    """The edges between faces of different regions."""
+    he = mesh.half_edges
+    k = he.interior
+    k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]
+    return np.stack([he.origin[k], he.dest[k]], axis=1)
 
 
 def seam_faces(mesh: Mesh, label: np.ndarray) -> np.ndarray:
@@ -104,16 +110,17 @@ class TestRegions:
         mesh = Mesh(grid.vertices, grid.triangles)
         half = (mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 5).astype(np.int64)
         inside = np.flatnonzero(np.bincount(seam_faces(mesh, half), minlength=len(half)) == 0)
+        regions = Regions(mesh, np.empty((0, 2), np.int64))
         for face in inside:
             label = half.copy()
             label[face] = 1 - label[face]
-            assert (connected(mesh, label) == half).all()
+            assert (regions.connected(label) == half).all()
 
     def test_boundaries_stay_on_creases(self):
         mesh = roof(31)
         middle = mesh.vertices[mesh.faces].mean(axis=1)
         label = (middle[:, 0] > 0).astype(np.int64)
-        regions = Regions(mesh, crease_lines(mesh, 1.0))
+        regions = Regions(mesh, Creases(35.0).edges(mesh))
         divided = regions.cut_between(regions.fields(regions.fair(label, 0.2), 0.2))
         ends = divided.mesh.vertices[seam_edges(divided.mesh, divided.label)]
         np.testing.assert_allclose(ends[..., 0], 0.0, atol=1e-12)
@@ -140,7 +147,7 @@ class TestTheSearch:
 
     @pytest.mark.parametrize("allowed", [1e-200, 3.0, 1e80])
     def test_any_distance_has_a_copy(self, allowed):
-        copy = coarse_copy(ball(30), allowed)
+        copy = CoarseCopy.of(ball(30), allowed)
         assert 100 < len(copy.mesh.vertices) <= 2 * 30**2
 
     def test_an_unknown_effort_is_named(self):

@@ -17,12 +17,15 @@ from gso.seams.kinds import Creases, Edges, Groups, Labels, Path, Seam, Slice
 from gso.seams.polyline_seam import Polyline
 
 if TYPE_CHECKING:
+    from gso.seams.coarse_copy import CoarseCopy
     from gso.seams.disks import opening
+    from gso.seams.regions import Regions
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
 
 __all__ = [
+    "CoarseCopy",
     "Creases",
     "Edges",
     "Groups",
@@ -31,6 +34,7 @@ __all__ = [
     "Piece",
     "Pieces",
     "Polyline",
+    "Regions",
     "Seam",
     "Segmentation",
     "Sheet",
@@ -45,7 +49,9 @@ __all__ = [
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
+        "coarse_copy": "CoarseCopy",
         "disks": "opening",
+        "regions": "Regions",
         "search": "pieces",
         "segmentation": "Segmentation",
         "sheets": "Sheet",

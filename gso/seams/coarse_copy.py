@@ -73,38 +73,40 @@ class CoarseCopy:
     ids: Ints
     lines: Ints
 
+    @classmethod
+    def of(cls, design: Mesh, distance: float) -> CoarseCopy:
+        """Make the copy of a design for an allowed distance.
 
-def coarse_copy(design: Mesh, distance: float) -> CoarseCopy:
-    """Make the copy of a design for an allowed distance.
+        Parameters
+        ----------
+        design : Mesh
+        distance : float
 
-    Parameters
-    ----------
-    design : Mesh
-    distance : float
-
-    Examples
-    --------
-    >>> y, x = np.mgrid[0:1:60j, 0:1:60j]
-    >>> sheet = Mesh.from_grid(np.dstack([x, y, 0.2 * x * y]))
-    >>> copy = coarse_copy(sheet, 0.05)
-    >>> len(copy.mesh.vertices) < 0.5 * len(sheet.vertices), len(copy.lines)
-    (True, 0)
-    """
-    # Beyond that the copy would be no surface any more; the search measures by what was asked for.
-    distance = float(np.clip(distance, _LEAST * design.diagonal, _LARGEST * design.diagonal))
-    triangles = Mesh(design.vertices, design.triangles, attributes=design.attributes)
-    area = metrics.area(triangles)
-    count = int(np.clip(area / (0.866 * (_EDGE * distance) ** 2), _FEWEST, _MOST))
-    count = min(count, max(_FEWEST, _FINER * int(design.used.sum())))
-    step = float(np.sqrt(area / (0.866 * count)))
-    base = with_short_edges(triangles, _LONG * step)
-    creases = crease_lines(base, _CREASE * distance)
-    smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
-    thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
-    fine = Mesh(smooth.vertices[thin.ids], thin.faces)
-    own = thinned(fine.vertices, fine.faces, count, _narrow(fine, thin.lines, distance), thin.lines)
-    mesh, ids = Mesh(fine.vertices[own.ids], own.faces), thin.ids[own.ids]
-    return CoarseCopy(base, smooth, creases, mesh, ids, own.lines)
+        Examples
+        --------
+        >>> y, x = np.mgrid[0:1:60j, 0:1:60j]
+        >>> sheet = Mesh.from_grid(np.dstack([x, y, 0.2 * x * y]))
+        >>> copy = CoarseCopy.of(sheet, 0.05)
+        >>> len(copy.mesh.vertices) < 0.5 * len(sheet.vertices), len(copy.lines)
+        (True, 0)
+        """
+        # Beyond that the copy would be no surface; the search measures by what was asked for.
+        distance = float(np.clip(distance, _LEAST * design.diagonal, _LARGEST * design.diagonal))
+        triangles = Mesh(design.vertices, design.triangles, attributes=design.attributes)
+        area = metrics.area(triangles)
+        count = int(np.clip(area / (0.866 * (_EDGE * distance) ** 2), _FEWEST, _MOST))
+        count = min(count, max(_FEWEST, _FINER * int(design.used.sum())))
+        step = float(np.sqrt(area / (0.866 * count)))
+        base = with_short_edges(triangles, _LONG * step)
+        creases = crease_lines(base, _CREASE * distance)
+        smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
+        thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
+        fine = Mesh(smooth.vertices[thin.ids], thin.faces)
+        own = thinned(
+            fine.vertices, fine.faces, count, _narrow(fine, thin.lines, distance), thin.lines
+        )
+        mesh, ids = Mesh(fine.vertices[own.ids], own.faces), thin.ids[own.ids]
+        return cls(base, smooth, creases, mesh, ids, own.lines)
 
 
 def _narrow(mesh: Mesh, creases: Ints, distance: float) -> Ints:

@@ -134,6 +134,10 @@ class Regions:
             label = value.argmax(axis=1)
         return numbered(connected(self.mesh, label, value))
 
+    def connected(self, label: Ints) -> Ints:
+        """Give all but the largest part of each region (m,) to neighbours."""
+        return connected(self.mesh, label)
+
     def cut_between(self, fields: Array) -> Divided:
         """Divide triangles along the boundaries between regions.
 

@@ -19,7 +19,7 @@ from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
 from gso.seams.candidates import disks
 from gso.seams.carrying import base_fields, base_start
-from gso.seams.coarse_copy import CoarseCopy, coarse_copy
+from gso.seams.coarse_copy import CoarseCopy
 from gso.seams.compact_patches import patches
 from gso.seams.cutting import cut
 from gso.seams.distance_estimate import DistanceEstimates
@@ -246,7 +246,7 @@ def divided_within(design: Mesh, settings: PieceSettings) -> Trial:
         raise ValueError("the search within a distance needs max_deviation")
     settings.say("a copy at the scale of the distance")
     allowed = Allowed(settings.max_deviation, settings.max_strain)
-    copy = coarse_copy(design, allowed.distance)
+    copy = CoarseCopy.of(design, allowed.distance)
     search = _Search(design, copy, allowed, settings)
     best = _of_copy(search)
     return _of_design(search, best)

@@ -31,6 +31,7 @@ from gso.mesh import Mesh, Polylines, topology, vertex_normals
     planarity,
     position,
     proximity,
+    reach,
     scale,
     shear,
     smooth_curve,
@@ -58,6 +59,7 @@ from gso.mesh import Mesh, Polylines, topology, vertex_normals
         "planarity",
         "position",
         "proximity",
+        "reach",
         "scale",
         "shear",
         "smooth_curve",
@@ -171,6 +173,14 @@ _BUILT: dict[str, Callable[[Mesh], list[Term]]] = {
         position.build(np.arange(3), mesh.vertices[:3] + 0.1, np.ones(3)),
     ],
     "proximity": lambda mesh: [proximity.build(mesh, vertex_normals(mesh), tangential=0.5)],
+    "reach": lambda mesh: [
+        reach.build(
+            mesh,
+            vertex_normals(mesh),
+            np.linspace(0.5, 1.5, len(mesh.vertices)),
+            mesh.half_edges.boundary_vertex,
+        )
+    ],
     "scale": lambda mesh: [scale.build(mesh)],
     "shear": shear.build,
     "smooth_curve": _smooth_curve,
