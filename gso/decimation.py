@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from gso import faults, metrics
 from gso.mesh import Mesh, Nearest
-from gso.mesh.topology import edge_graph
-from gso.typing import Ints
+from gso.mesh.topology import neighbour_means
 
 #: Rounds in which folded triangles are smoothed, and the one from which their neighbours move too.
 _ROUNDS, _WIDER = 20, 4
@@ -72,7 +70,7 @@ def _unfolded(light: Mesh, surface: Nearest, original: Mesh) -> Mesh:
     faces, n = light.triangles, len(light.vertices)
     free = light.used.copy()
     free[light.edges[light.boundary_edges].ravel()] = False
-    mean = _means(light.edges, n)
+    mean = neighbour_means(light.edges, n)
     points = light.vertices.copy()
     for number in range(_ROUNDS):
         bad = faults.folded(light)
@@ -86,12 +84,3 @@ def _unfolded(light: Mesh, surface: Nearest, original: Mesh) -> Mesh:
         points[k] = 0.5 * points[k] + 0.5 * surface.locate(mean[k] @ points)[2]
         light = light.replaced(points)
     return original
-
-
-def _means(edges: Ints, count: int) -> csr_matrix:
-    """Return the matrix (n, n) that gives the mean of each vertex's neighbours."""
-    from scipy.sparse import diags
-
-    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    matrix = edge_graph(count, rows, columns)
-    return diags(1.0 / np.maximum(matrix.sum(axis=1).A1, 1.0)) @ matrix

@@ -60,20 +60,25 @@ def divided(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
     >>> finer.faces.tolist()
     [[4, 0, 3], [2, 4, 3], [2, 3, 1]]
     """
-    if not len(edges):
-        return mesh, np.empty((0, 2), np.int64)
     return parts_of(mesh, edges, shares)[0], edges
 
 
 def parts_of(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
     """Insert vertices as :func:`divided` does; return the face that each one is a part of, too."""
+    if not len(edges):
+        return mesh, np.arange(len(mesh.faces))
     v = mesh.vertices
-    points = v[edges[:, 0]] + shares[:, None] * (v[edges[:, 1]] - v[edges[:, 0]])
     faces, owner = subdivided(mesh.faces[:, :3], len(v), edges)
     said = mesh.attributes
     if said is not None:
         said = replace(said, texture=None, texture_corners=None).taken(owner)
-    return Mesh(np.concatenate([v, points]), faces, attributes=said), owner
+    return Mesh(with_points(v, edges, shares), faces, attributes=said), owner
+
+
+def with_points(points: Array, edges: Ints, shares: Array) -> Array:
+    """Return points (n + k, 3) with one on each of some edges (k, 2) between them."""
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    return np.concatenate([points, a + shares[:, None] * (b - a)])
 
 
 def subdivided(f: Ints, n: int, edges: Ints) -> tuple[Ints, Ints]:

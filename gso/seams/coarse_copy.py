@@ -20,6 +20,7 @@ from gso.mesh.cut import cut
 from gso.mesh.slicing import divided
 from gso.seams.crease_lines import crease_lines
 from gso.seams.distance_estimate import largest_curvatures
+from gso.seams.kinds import Creases
 from gso.seams.potential import Potential
 from gso.typing import Ints
 
@@ -124,10 +125,7 @@ def with_short_edges(mesh: Mesh, longest: float) -> Mesh:
         if not long.any():
             break
         mesh, _ = divided(mesh, mesh.edges[long], np.full(int(long.sum()), 0.5))
-        he = mesh.half_edges
-        k = he.interior[metrics.dihedral_angles(mesh) > _BENT]
-        bent = np.sort(np.stack([he.origin[k], he.dest[k]], axis=1), axis=1)
-        faces = flipped(mesh.vertices, mesh.faces, bent)
+        faces = flipped(mesh.vertices, mesh.faces, Creases(_BENT).edges(mesh))
         mesh = Mesh(mesh.vertices, faces, attributes=mesh.attributes)
     return mesh
 
@@ -139,7 +137,7 @@ def smoothed_within(mesh: Mesh, width: float, distance: float, held: Ints) -> Me
     edges (k, 2) stay.
     """
     field = Potential(mesh)
-    area = np.maximum(field.area, 1e-9 * float(field.area.mean()))
+    area = field.mass
     bending = field.stiffness @ diags(1.0 / area) @ field.stiffness
     weight = np.where(np.isin(np.arange(len(area)), held), _HELD, 1.0) * area
     solve = spd(diags(weight) + width**4 * bending)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
-from gso import metrics
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_graph
+from gso.mesh.topology import label_components
+from gso.seams.kinds import Creases
 from gso.typing import Ints
 
 #: Angle between faces, in degrees, from which on an edge is a crease.
@@ -32,18 +31,10 @@ def crease_lines(mesh: Mesh, shortest: float) -> Ints:
     >>> crease_lines(Mesh(roof.vertices, roof.triangles), 1.0).tolist()
     [[2, 7], [7, 12]]
     """
-    he, none = mesh.half_edges, np.empty((0, 2), np.int64)
-    k = he.interior
-    sharp = k[metrics.dihedral_angles(mesh) > _ANGLE]
-    ends = np.sort(np.stack([he.origin[sharp], he.dest[sharp]], axis=1), axis=1)
-    if not len(ends):
-        return none
-    points = mesh.vertices
-    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
-    whole = float(np.linalg.norm(points[he.origin[k]] - points[he.dest[k]], axis=1).sum())
-    if length.sum() > _MOST * whole:
-        return none
-    graph = edge_graph(len(points), ends[:, 0], ends[:, 1])
-    label = connected_components(graph, directed=False)[1][ends[:, 0]]
+    ends = np.sort(Creases(_ANGLE).edges(mesh), axis=1)
+    length = np.linalg.norm(np.diff(mesh.vertices[ends], axis=1)[:, 0], axis=1)
+    if length.sum() > _MOST * mesh.edge_lengths[~mesh.boundary_edges].sum():
+        return np.empty((0, 2), np.int64)
+    label = label_components(len(mesh.vertices), ends[:, 0], ends[:, 1])[ends[:, 0]]
     long = np.bincount(label, length)[label] >= shortest
     return np.asarray(ends[long][np.lexsort(ends[long].T[::-1])])

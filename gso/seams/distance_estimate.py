@@ -54,17 +54,11 @@ def largest_curvatures(mesh: Mesh) -> Array:
     It is the root of the sum of the squares of both principal curvatures, from the change of the
     normals at the corners.
     """
-    points, normals, faces = mesh.vertices, vertex_normals(mesh), mesh.faces
-    side = np.stack([points[faces[:, k]] - points[faces[:, 0]] for k in (1, 2)], axis=2)
-    turn = np.stack([normals[faces[:, k]] - normals[faces[:, 0]] for k in (1, 2)], axis=2)
-    up = geometry.area_vectors(points, faces)
-    size = np.linalg.norm(up, axis=1)
-    along = side[:, :, 0] / np.maximum(np.linalg.norm(side[:, :, 0], axis=1, keepdims=True), 1e-300)
-    across = np.cross(up / np.maximum(size, 1e-300)[:, None], along)
-    frame = np.stack([along, across], axis=1)
-    sides, turns = frame @ side, frame @ turn
-    good = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
-    sides[~good] = np.eye(2)
-    turns[~good] = 0.0
-    shape = np.swapaxes(np.linalg.solve(np.swapaxes(sides, 1, 2), np.swapaxes(turns, 1, 2)), 1, 2)
-    return np.asarray(np.linalg.norm(shape, axis=(1, 2)))
+    corners, normals = mesh.vertices[mesh.faces], vertex_normals(mesh)[mesh.faces]
+    size = np.linalg.norm(geometry.area_vectors(mesh.vertices, mesh.faces), axis=1)
+    good = size > 1e-12 * float(size.max(initial=0.0))
+    sides = [tuple(x[good, k].T - x[good, 0].T) for x in (corners, normals) for k in (1, 2)]
+    rows = geometry.shape_matrix(*sides)
+    out = np.zeros(len(mesh.faces))
+    out[good] = np.sqrt(sum(x * x for row in rows for x in row))
+    return out

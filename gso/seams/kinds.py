@@ -143,7 +143,7 @@ class Slice(Seam):
                 return between(mesh, below, above, _NEAR + np.abs(height) / step)
         corner = np.where(faces >= 0, height[faces], 0.0)
         side = corner.sum(axis=1) > 0
-        return _between(mesh, side.astype(np.int64))
+        return edges_between(mesh, side.astype(np.int64))
 
     def _heights(self, mesh: Mesh) -> Array:
         """Return the signed distances (n,) of the vertices; those close to zero are zero."""
@@ -179,7 +179,7 @@ class Labels(Seam):
             raise MeshError(f"the mesh has no {LABELS[self.kind]} ({self.kind!r}) to cut between")
         labels = said.labels[self.kind]
         _, same = np.unique(["", *labels.names], return_inverse=True)
-        return _between(mesh, same[labels.of_face + 1])
+        return edges_between(mesh, same[labels.of_face + 1])
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class Creases(Seam):
         return np.stack([he.origin[k], he.dest[k]], axis=1)
 
 
-def _between(mesh: Mesh, label: Ints) -> Ints:
+def edges_between(mesh: Mesh, label: Ints) -> Ints:
     """Return the edges (e, 2) between faces with different labels (m,)."""
     he, k = mesh.half_edges, mesh.half_edges.interior
     k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]

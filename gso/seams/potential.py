@@ -73,6 +73,11 @@ class Potential:
             (np.r_[-w, -w, w, w], (rows, columns)), shape=(count, count)
         ).tocsr()
 
+    @property
+    def mass(self) -> Array:
+        """The areas (n,), raised where they are almost zero, so that they can be divided by."""
+        return np.maximum(self.area, 1e-9 * float(self.area.mean()))
+
     def solve(self, fixed: Flags, within: Ints | None = None) -> Array:
         """Return u (n,), which is zero at fixed vertices.
 

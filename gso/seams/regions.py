@@ -21,7 +21,7 @@ from gso import geometry
 from gso.linalg import spd
 from gso.mesh import Cut, Mesh
 from gso.mesh.cut import cut
-from gso.mesh.slicing import parts_of
+from gso.mesh.slicing import parts_of, with_points
 from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.seams.potential import Potential
 from gso.typing import Array, Flags, Ints
@@ -58,8 +58,7 @@ class Divided(NamedTuple):
 
     def moved(self, points: Array) -> Array:
         """Return points (n + k, 3) for those of the mesh that was divided (n, 3)."""
-        a, b = points[self.ends[:, 0]], points[self.ends[:, 1]]
-        return np.concatenate([points, a + self.shares[:, None] * (b - a)])
+        return with_points(points, self.ends, self.shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +106,7 @@ class Regions:
 
     def diffused(self, masses: Array, width: float) -> Array:
         """Diffuse masses (p, k) at the vertices of the opened mesh over a width."""
-        area = self.potential.area
-        area = np.maximum(area, 1e-9 * float(area.mean()))
-        solve = spd(diags(area) + width**2 * self._stiffness)
+        solve = spd(diags(self.potential.mass) + width**2 * self._stiffness)
         return np.stack([solve(column) for column in masses.T], axis=1)
 
     def masses(self, label: Ints) -> Array:
@@ -162,8 +159,9 @@ class Regions:
         share = np.where(forward, share, 1.0 - share)
         edges, which = np.unique(key[crossed], return_inverse=True)
         if not len(edges):
-            label = self._labels(mesh.faces, np.arange(len(mesh.faces)), fields, None)
-            return Divided(mesh, label, np.empty((0, 2), np.int64), np.empty(0))
+            ends, place = np.empty((0, 2), np.int64), np.empty(0)
+            label = self._labels(mesh.faces, np.arange(len(mesh.faces)), fields, ends, place)
+            return Divided(mesh, label, ends, place)
         place = np.bincount(which, share[crossed]) / np.bincount(which)
         place = np.clip(place, _SNAP / 2, 1.0 - _SNAP / 2)
         ends = np.stack(np.divmod(edges, len(mesh.vertices)), axis=1)
@@ -171,12 +169,10 @@ class Regions:
         fields = fields.copy()
         tied = np.flatnonzero(second >= 0)
         fields[tied, second[tied]] = fields[tied, best[tied]]
-        label = connected(finer, self._labels(finer.faces, owner, fields, (ends, place)))
+        label = connected(finer, self._labels(finer.faces, owner, fields, ends, place))
         return Divided(_without_ears(finer, label), label, ends, place)
 
-    def _labels(
-        self, faces: Ints, owner: Ints, fields: Array, inserted: tuple[Ints, Array] | None
-    ) -> Ints:
+    def _labels(self, faces: Ints, owner: Ints, fields: Array, ends: Ints, shares: Array) -> Ints:
         """Return the region with the largest value in each part of a triangle."""
         n = len(self.mesh.vertices)
         own, copies = self.mesh.faces[owner], self.opened.mesh.faces[owner]
@@ -188,23 +184,14 @@ class Regions:
 
         for corner in faces.T:
             old = corner < n
-            if inserted is None or old.all():
+            if old.all():
                 value += at(corner)
                 continue
-            ends, share = inserted
             k = np.where(old, 0, corner - n)
             one, two = (np.where(old, corner, ends[k, side]) for side in (0, 1))
-            part = np.where(old, 0.0, share[k])[:, None]
+            part = np.where(old, 0.0, shares[k])[:, None]
             value += (1.0 - part) * at(one) + part * at(two)
         return np.asarray(value.argmax(axis=1))
-
-
-def seam_edges(mesh: Mesh, label: Ints) -> Ints:
-    """Return the edges (e, 2) between faces of different regions."""
-    he = mesh.half_edges
-    k = he.interior
-    k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]
-    return np.stack([he.origin[k], he.dest[k]], axis=1)
 
 
 def _without_ears(mesh: Mesh, label: Ints) -> Mesh:

@@ -23,11 +23,11 @@ from gso.seams.coarse_copy import CoarseCopy
 from gso.seams.compact_patches import patches
 from gso.seams.cutting import cut
 from gso.seams.distance_estimate import DistanceEstimates
-from gso.seams.kinds import Edges
+from gso.seams.kinds import Edges, edges_between
 from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
 from gso.seams.potential import Potential
-from gso.seams.regions import Divided, Regions, numbered, seam_edges
+from gso.seams.regions import Divided, Regions, numbered
 from gso.seams.tree import Ground
 from gso.seams.trial import Allowed, Trial, tried
 from gso.typing import Array, Ints
@@ -67,10 +67,22 @@ _REPAIRS = 3
 class _Search:
     """What the search knows about a design."""
 
-    design: Mesh
     copy: CoarseCopy
     allowed: Allowed
     settings: PieceSettings
+
+    @cached_property
+    def of_copy(self) -> Allowed:
+        """What pieces of the copy may use."""
+        return replace(self.allowed, design=self.copy.mesh, distance=_ROOM * self.allowed.distance)
+
+    @cached_property
+    def beside(self) -> tuple[Ints, Array]:
+        """Faces (e, 2) on both sides of each inner edge of the copy, and its length (e,)."""
+        mesh, he = self.copy.mesh, self.copy.mesh.half_edges
+        k = he.interior
+        length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
+        return np.stack([he.face[k], he.face[he.twin[k]]], axis=1), length
 
     @cached_property
     def ground(self) -> Ground:
@@ -121,33 +133,29 @@ class _Search:
         return min(found, key=self.value)
 
     def value(self, label: Ints) -> tuple[int, float, float]:
-        mesh = self.copy.mesh
-        ends = seam_edges(mesh, label)
-        length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
+        """Rank regions by their number and the length of their boundaries."""
+        faces, length = self.beside
+        seam = float(length[np.ptp(label[faces], axis=1) > 0].sum())
         size = float(np.sqrt(self.regions.face_area.sum()))
-        return self.settings.value(int(label.max()) + 1, float(length.sum()) / size)
+        return self.settings.value(int(label.max()) + 1, seam / size)
 
     def without_small(self, label: Ints, share: float = 0.0) -> Ints:
         """Merge small regions with their neighbours.
 
         They are smaller than a share of the mean, or so small that nobody would cut them.
         """
-        area, mesh = self.regions.face_area, self.copy.mesh
+        faces, length = self.beside
         while True:
-            size = np.bincount(label, area)
+            size = np.bincount(label, self.regions.face_area)
             small = np.flatnonzero(size < max(share * size.mean(), _TINY * size.sum()))
-            he = mesh.half_edges
-            k = he.interior
-            a, b = label[he.face[k]], label[he.face[he.twin[k]]]
-            length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
+            a, b = label[faces].T
             for own in small[np.argsort(size[small], kind="stable")].tolist():
-                beside = np.bincount(
-                    np.r_[b[(a == own) & (b != own)], a[(b == own) & (a != own)]],
-                    np.r_[length[(a == own) & (b != own)], length[(b == own) & (a != own)]],
-                    len(size),
+                out, back = (a == own) & (b != own), (b == own) & (a != own)
+                shared = np.bincount(
+                    np.r_[b[out], a[back]], np.r_[length[out], length[back]], len(size)
                 )
-                if beside.any():
-                    label = numbered(np.where(label == own, beside.argmax(), label))
+                if shared.any():
+                    label = numbered(np.where(label == own, shared.argmax(), label))
                     break
             else:
                 return label
@@ -157,13 +165,11 @@ class _Search:
         regions = self.regions
         divided = regions.cut_between(regions.fields(label, self.width))
         pieces = self.opened(divided, self.apexes)
-        allowed = replace(self.allowed, distance=_ROOM * self.allowed.distance)
         return tried(
             label,
             divided,
             pieces,
-            self.copy.mesh,
-            allowed,
+            self.of_copy,
             repairs=_REPAIRS - 1,
             executor=self.settings.executor,
         )
@@ -195,7 +201,7 @@ class _Search:
 
     def opened(self, divided: Divided, apexes: Ints) -> Pieces:
         """Cut between regions, to the apexes of cones, and until all pieces are disks."""
-        mesh, edges = divided.mesh, seam_edges(divided.mesh, divided.label)
+        mesh, edges = divided.mesh, edges_between(divided.mesh, divided.label)
         ground = Ground.of(mesh)
         reached = mesh.half_edges.boundary_vertex.copy()
         reached[edges] = True
@@ -221,7 +227,7 @@ class _Search:
             found = self.estimate(faces)
             found = _LEVELS[0] if found is None else max(found, _LEVELS[-1] / 2)
             level[faces] = found * float(np.clip(1.0 / excess[own], *_SMALLER))
-        kept = np.concatenate([seam_edges(mesh, label), self.copy.lines])
+        kept = np.concatenate([edges_between(mesh, label), self.copy.lines])
         finer = patches(mesh, max(_PATCHES[-1], 4 * len(excess)), kept)
         start = numbered(np.where(bad[label], finer + len(excess), label))
         new = self.merged(start, level, _COMPACT[0])
@@ -245,42 +251,42 @@ def divided_within(design: Mesh, settings: PieceSettings) -> Trial:
     if settings.max_deviation is None:
         raise ValueError("the search within a distance needs max_deviation")
     settings.say("a copy at the scale of the distance")
-    allowed = Allowed(settings.max_deviation, settings.max_strain)
-    copy = CoarseCopy.of(design, allowed.distance)
-    search = _Search(design, copy, allowed, settings)
+    allowed = Allowed(design, settings.max_deviation, settings.max_strain)
+    search = _Search(CoarseCopy.of(design, allowed.distance), allowed, settings)
     best = _of_copy(search)
     return _of_design(search, best)
 
 
 def _of_copy(search: _Search) -> Trial:
     """Return the best trial on the copy."""
-    say = search.settings.say
     found: list[Trial] = []
     for level in _LEVELS:
         label = search.divided(level)
         if found and label.max() == found[-1].label.max():
             continue
-        for number in range(search.settings.effort.divisions + 1):
-            say(f"seams and shape, attempt {len(found) + 1}: {label.max() + 1} pieces")
-            found.append(search.measured(label))
-            excess = found[-1].of_regions()
-            area = np.bincount(label, search.regions.face_area)
-            few = area[excess > 1.0].sum() <= _FEW * area.sum() or excess.max() <= _LITTLE
-            if (
-                found[-1].holds
-                or _hopeless(found[-1])
-                or not few
-                or number == search.settings.effort.divisions
-            ):
-                break
-            finer = search.smaller(found[-1], excess)
-            if np.array_equal(finer, label):
-                break
-            label = finer
+        found += _refined(search, label, len(found))
         if found[-1].holds or _hopeless(found[-1]):
             break
     best = min(found, key=lambda one: _rank(one, search.settings))
     return _merged(search, best) if best.holds else best
+
+
+def _refined(search: _Search, label: Ints, before: int) -> list[Trial]:
+    """Try regions, and divide those that do not hold as long as these are few or nearly do."""
+    found: list[Trial] = []
+    while True:
+        number = before + len(found) + 1
+        search.settings.say(f"seams and shape, attempt {number}: {label.max() + 1} pieces")
+        found.append(search.measured(label))
+        trial, excess = found[-1], found[-1].of_regions()
+        area = np.bincount(label, search.regions.face_area)
+        few = area[excess > 1.0].sum() <= _FEW * area.sum() or excess.max() <= _LITTLE
+        ends = trial.holds or _hopeless(trial) or not few
+        if ends or len(found) > search.settings.effort.divisions:
+            return found
+        label = search.smaller(trial, excess)
+        if np.array_equal(label, trial.label):
+            return found
 
 
 def _hopeless(trial: Trial) -> bool:
@@ -336,18 +342,15 @@ def _pairs(
     search: _Search, trial: Trial, forbidden: set[tuple[bytes, bytes]]
 ) -> list[tuple[int, int]]:
     """Choose pairs of neighbours to merge, those with the least estimate first."""
-    label, mesh = trial.label, search.copy.mesh
-    he = mesh.half_edges
-    k = he.interior
-    a, b = label[he.face[k]], label[he.face[he.twin[k]]]
-    beside = np.unique(np.sort(np.stack([a, b], axis=1)[a != b], axis=1), axis=0)
+    label = trial.label
+    sides = np.sort(label[search.beside[0]], axis=1)
     ranked = []
-    for a_, b_ in beside.tolist():
-        if _name(label, (a_, b_)) in forbidden:
+    for one, two in np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0).tolist():
+        if _name(label, (one, two)) in forbidden:
             continue
-        found = search.estimate(np.flatnonzero((label == a_) | (label == b_)))
+        found = search.estimate(np.flatnonzero((label == one) | (label == two)))
         if found is not None and found <= _LIKELY:
-            ranked.append((found, a_, b_))
+            ranked.append((found, one, two))
     used: set[int] = set()
     out: list[tuple[int, int]] = []
     for _, one, two in sorted(ranked):
@@ -380,7 +383,6 @@ def _of_design(search: _Search, trial: Trial) -> Trial:
             trial.label,
             divided,
             pieces,
-            search.design,
             search.allowed,
             start,
             _ITERATIONS,

@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
 
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh, Nearest
-from gso.mesh.topology import edge_graph, edge_keys, pair_keys
+from gso.mesh.topology import edge_keys, neighbour_means, pair_keys
 from gso.pipeline import lay_out
 from gso.result import Result
 from gso.seams.cutting import cut
@@ -23,7 +22,7 @@ from gso.seams.regions import Divided, with_flips
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
-from gso.typing import Array, Flags, Ints
+from gso.typing import Array, Ints
 
 #: Share of the allowed distance beyond which the solver penalises it, and the weight of that.
 _REACH, _WEIGHT = 0.9, 5000.0
@@ -46,12 +45,18 @@ _FOLDED = 90.0
 _DOUBTFUL = 0.7
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Allowed:
-    """What pieces are measured by: largest distance from the design, and strain."""
+    """What pieces are measured by: largest distance from a design, and strain."""
 
+    design: Mesh
     distance: float
     strain: float
+
+    @cached_property
+    def near(self) -> Nearest:
+        """The closest points of the design."""
+        return Nearest(self.design)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +76,6 @@ class Trial:
     distance, strain : ndarray, (p,)
         Largest distance of each piece from the design, and strain of its pattern, over what is
         allowed.
-    folds : ndarray of int, (p,)
-        Number of folded faces of each piece that are not folded in the design.
     """
 
     label: Ints
@@ -81,7 +84,17 @@ class Trial:
     result: Result | None
     distance: Array
     strain: Array
-    folds: Ints
+
+    @cached_property
+    def folded(self) -> Ints:
+        """The faces that are folded inside pieces, and are not in the design."""
+        before = faults.folded(self.pieces.opened.mesh)
+        return np.setdiff1d(faults.folded(self.shape.opened.mesh), before)
+
+    @cached_property
+    def folds(self) -> Ints:
+        """Number of these of each piece (p,)."""
+        return np.bincount(self.shape.of_face[self.folded], minlength=len(self.region))
 
     @cached_property
     def excess(self) -> Array:
@@ -106,8 +119,12 @@ class Trial:
     @property
     def shape(self) -> Pieces:
         """The pieces after the solve."""
-        solved = None if self.result is None else self.result.pieces
-        return self.pieces if solved is None else solved
+        return _solved(self.pieces, self.result)
+
+
+def _solved(pieces: Pieces, result: Result | None) -> Pieces:
+    """Return pieces after a solve, if there was one."""
+    return pieces if result is None or result.pieces is None else result.pieces
 
 
 def options_for(allowed: Allowed) -> Options:
@@ -127,7 +144,6 @@ def tried(
     label: Ints,
     divided: Divided,
     pieces: Pieces,
-    design: Mesh,
     allowed: Allowed,
     start: Array | None = None,
     iterations: int | None = None,
@@ -144,8 +160,6 @@ def tried(
         The mesh with vertices on seams.
     pieces : Pieces
         Its pieces, all of them disks.
-    design : Mesh
-        The surface from which distances count.
     allowed : Allowed
     start : ndarray, (n, 3), optional
         Points of the divided mesh to begin with.
@@ -167,14 +181,14 @@ def tried(
             result = None
         # Flips change the areas of pieces, and so perhaps their order.
         region = divided.label[[part.faces[0] for part in pieces.parts]]
-        trial = _measured(label, pieces, region, result, design, allowed, executor)
+        trial = _measured(label, pieces, region, result, allowed, executor)
         found.append(trial)
         if trial.holds or result is None or not _repairable(trial):
             break
         if number >= repairs and trial.excess.max() > _CLOSE:
             break
         own = _stricter(own, trial)
-        start, iterations = untangled(trial.shape, _folded(trial)), _AGAIN
+        start, iterations = _untangled(trial), _AGAIN
         pieces = _with_flips(trial)
     return min(found, key=lambda one: float(one.excess.max()))
 
@@ -202,14 +216,12 @@ def _measured(
     pieces: Pieces,
     region: Ints,
     result: Result | None,
-    design: Mesh,
     allowed: Allowed,
     executor: Executor,
 ) -> Trial:
-    shape = pieces if result is None or result.pieces is None else result.pieces
+    shape, design, near = _solved(pieces, result), allowed.design, allowed.near
     meshes = [part.mesh for part in shape.parts]
     strain = np.array(executor.map(_strain, meshes))
-    near = Nearest(design)
     distance = np.array([float(near.distances(mesh.vertices).max()) for mesh in meshes])
     # And back: from the design to the nearest piece.
     face, away = Nearest(shape.design).nearest(design.vertices[design.used])
@@ -218,23 +230,9 @@ def _measured(
         # Points inside faces may be farther away than all vertices.
         most = metrics.largest_distance(design, shape.design)
         distance[distance.argmax()] = max(most, float(distance.max()))
-    out = Trial(
-        label,
-        pieces,
-        region,
-        result,
-        distance / allowed.distance,
-        strain / allowed.strain,
-        np.zeros(len(meshes), np.int64),
+    return Trial(
+        label, pieces, region, result, distance / allowed.distance, strain / allowed.strain
     )
-    folds = np.bincount(shape.of_face[_folded(out)], minlength=len(meshes))
-    return replace(out, folds=folds)
-
-
-def _folded(trial: Trial) -> Ints:
-    """Return the faces that are folded inside pieces, and are not in the design."""
-    before = faults.folded(trial.pieces.opened.mesh)
-    return np.setdiff1d(faults.folded(trial.shape.opened.mesh), before)
 
 
 def _with_flips(trial: Trial) -> Pieces:
@@ -244,7 +242,7 @@ def _with_flips(trial: Trial) -> Pieces:
     he = mesh.half_edges
     k = he.interior
     bad = np.zeros(len(mesh.faces), bool)
-    bad[_folded(trial)] = True
+    bad[trial.folded] = True
     f, g = he.face[k], he.face[he.twin[k]]
     seam = np.isin(
         edge_keys(he.origin[k], he.dest[k], len(mesh.vertices)),
@@ -260,28 +258,21 @@ def _with_flips(trial: Trial) -> Pieces:
         return trial.pieces
 
 
-def untangled(shape: Pieces, folded: Ints) -> Array:
-    """Return the points of a surface (n, 3) with the vertices of folded faces between neighbours.
+def _untangled(trial: Trial) -> Array:
+    """Return the solved points (n, 3) with the vertices of folded faces between their neighbours.
 
     Those on seams move to the middle of their neighbours on the seam, if there are two.
     """
-    mesh = shape.design
+    shape, mesh = trial.shape, trial.shape.design
     points, n = mesh.vertices.copy(), len(mesh.vertices)
     on, rim = np.zeros(n, bool), mesh.half_edges.boundary_vertex
     on[shape.edges] = True
 
-    def means(edges: Ints, only: int | None = None) -> tuple[csr_matrix, Flags]:
-        ends = np.concatenate([edges, edges[:, ::-1]])
-        matrix = edge_graph(n, ends[:, 0], ends[:, 1])
-        number = np.bincount(ends[:, 0], minlength=n)
-        scaled = diags(1.0 / np.maximum(number, 1)) @ matrix
-        return scaled, number > 0 if only is None else number == only
-
-    inner, _ = means(mesh.edges)
-    along, between = means(shape.edges, 2)
+    inner, along = (neighbour_means(edges, n) for edges in (mesh.edges, shape.edges))
     some = np.zeros(n, bool)
-    some[mesh.faces[folded]] = True
-    free, seam = some & ~on & ~rim, some & on & between & ~rim
+    some[mesh.faces[trial.folded]] = True
+    free = some & ~on & ~rim
+    seam = some & (np.bincount(shape.edges.ravel(), minlength=n) == 2) & ~rim
     for _ in range(_ROUNDS):
         moved = points.copy()
         moved[free] = (inner @ points)[free]

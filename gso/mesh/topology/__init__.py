@@ -7,7 +7,7 @@ a vertex or the side of a grid, never over elements.
 
 from __future__ import annotations
 
-from gso.mesh.topology.graph import edge_graph, label_components
+from gso.mesh.topology.graph import edge_graph, label_components, neighbour_means
 from gso.mesh.topology.grid import grid_faces, recognise_grid
 from gso.mesh.topology.half_edges import (
     HalfEdges,
@@ -60,6 +60,7 @@ __all__ = [
     "half_edges",
     "hinges",
     "label_components",
+    "neighbour_means",
     "orient",
     "pair_keys",
     "polyline_crosses",

@@ -31,6 +31,15 @@ def edge_graph(count: int, a: Ints, b: Ints, weight: Array | None = None) -> csr
     return coo_matrix((values, (a, b)), shape=(count, count)).tocsr()
 
 
+def neighbour_means(edges: Ints, count: int) -> csr_matrix:
+    """Return the matrix (n, n) that gives the mean of each node's neighbours along edges (e, 2)."""
+    from scipy.sparse import diags
+
+    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
+    matrix = edge_graph(count, rows, columns)
+    return diags(1.0 / np.maximum(matrix.sum(axis=1).A1, 1.0)) @ matrix
+
+
 def label_components(count: int, a: Ints, b: Ints) -> Ints:
     """Number the connected components of a graph, in the order of their first nodes.
 
