@@ -8,6 +8,7 @@ and not on the file.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import diags
@@ -22,6 +23,7 @@ from gso.seams.crease_lines import crease_lines
 from gso.seams.distance_estimate import largest_curvatures
 from gso.seams.kinds import Creases
 from gso.seams.potential import Potential
+from gso.seams.wanted import Wanted
 from gso.typing import Ints
 
 #: Share of the distance that smoothing may use.
@@ -58,7 +60,9 @@ class CoarseCopy:
     smooth : Mesh
         The base with smoothed vertices.
     creases : ndarray of int, (k, 2)
-        Edges of the base on creases.
+        Edges of the base on creases, and on other lines that seams prefer.
+    wanted : Wanted
+        What is asked of the seams of the base.
     mesh : Mesh
         The copy: a coarser mesh of some vertices of the smooth one.
     ids : ndarray of int, (n,)
@@ -70,18 +74,28 @@ class CoarseCopy:
     base: Mesh
     smooth: Mesh
     creases: Ints
+    wanted: Wanted
     mesh: Mesh
     ids: Ints
     lines: Ints
 
+    @cached_property
+    def wanted_of_copy(self) -> Wanted:
+        """What is asked of the seams of the copy."""
+        wanted, lines = self.wanted, self.lines
+        kept, along = (lines[np.isin(self.ids, own)[lines].all(axis=1)] for own in wanted.lines)
+        return Wanted(kept, along, wanted.avoided[self.ids])
+
     @classmethod
-    def of(cls, design: Mesh, distance: float) -> CoarseCopy:
+    def of(cls, design: Mesh, distance: float, wanted: Wanted | None = None) -> CoarseCopy:
         """Make the copy of a design for an allowed distance.
 
         Parameters
         ----------
         design : Mesh
         distance : float
+        wanted : Wanted, optional
+            What is asked of its seams.
 
         Examples
         --------
@@ -98,8 +112,12 @@ class CoarseCopy:
         count = int(np.clip(area / (0.866 * (_EDGE * distance) ** 2), _FEWEST, _MOST))
         count = min(count, max(_FEWEST, _FINER * int(design.used.sum())))
         step = float(np.sqrt(area / (0.866 * count)))
-        base = with_short_edges(triangles, _LONG * step)
+        if wanted is None:
+            wanted = Wanted.nothing(triangles)
+        base, wanted = with_short_edges(triangles, _LONG * step, wanted)
         creases = crease_lines(base, _CREASE * distance)
+        creases = np.concatenate([creases, wanted.kept, wanted.along])
+        creases = np.unique(np.sort(creases, axis=1), axis=0)
         smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
         thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
         fine = Mesh(smooth.vertices[thin.ids], thin.faces)
@@ -107,7 +125,7 @@ class CoarseCopy:
             fine.vertices, fine.faces, count, _narrow(fine, thin.lines, distance), thin.lines
         )
         mesh, ids = Mesh(fine.vertices[own.ids], own.faces), thin.ids[own.ids]
-        return cls(base, smooth, creases, mesh, ids, own.lines)
+        return cls(base, smooth, creases, wanted, mesh, ids, own.lines)
 
 
 def _narrow(mesh: Mesh, creases: Ints, distance: float) -> Ints:
@@ -116,18 +134,19 @@ def _narrow(mesh: Mesh, creases: Ints, distance: float) -> Ints:
     return np.setdiff1d(mesh.faces[bent], creases)
 
 
-def with_short_edges(mesh: Mesh, longest: float) -> Mesh:
+def with_short_edges(mesh: Mesh, longest: float, wanted: Wanted) -> tuple[Mesh, Wanted]:
     """Divide the edges of a triangle mesh that are longer than a length; the shape stays."""
-    if mesh.edge_lengths.max(initial=0.0) <= longest:
-        return mesh
     for _ in range(20):
         long = mesh.edge_lengths > longest
         if not long.any():
             break
-        mesh, _ = divided(mesh, mesh.edges[long], np.full(int(long.sum()), 0.5))
-        faces = flipped(mesh.vertices, mesh.faces, Creases(_BENT).edges(mesh))
+        edges = mesh.edges[long]
+        wanted = wanted.through(edges, len(mesh.vertices))
+        mesh, _ = divided(mesh, edges, np.full(len(edges), 0.5))
+        stay = np.concatenate([Creases(_BENT).edges(mesh), *wanted.lines])
+        faces = flipped(mesh.vertices, mesh.faces, np.sort(stay, axis=1))
         mesh = Mesh(mesh.vertices, faces, attributes=mesh.attributes)
-    return mesh
+    return mesh, wanted
 
 
 def smoothed_within(mesh: Mesh, width: float, distance: float, held: Ints) -> Mesh:

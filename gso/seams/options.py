@@ -37,15 +37,25 @@ class Effort:
         How many solves merge pieces that do.
     rounds : int
         How often the design's own pieces are solved, each time with more of them.
+    budgets : int
+        How many solves merge pieces, or move seams, where a budget does not hold.
+    variants : int
+        How many divisions are tried for each bound on the estimate.
     """
 
     divisions: int
     merges: int
     rounds: int
+    budgets: int
+    variants: int
 
 
 #: By name, the fastest first.
-EFFORTS = {"draft": Effort(2, 0, 2), "standard": Effort(3, 8, 4), "best": Effort(4, 24, 6)}
+EFFORTS = {
+    "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=1),
+    "standard": Effort(divisions=3, merges=8, rounds=4, budgets=12, variants=1),
+    "best": Effort(divisions=4, merges=24, rounds=6, budgets=30, variants=3),
+}
 
 
 def effort_named(name: str) -> Effort:

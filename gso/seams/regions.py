@@ -21,13 +21,16 @@ from gso import geometry
 from gso.linalg import spd
 from gso.mesh import Cut, Mesh
 from gso.mesh.cut import cut
-from gso.mesh.slicing import parts_of, with_points
+from gso.mesh.slicing import lines_through, parts_of, with_points
 from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.seams.potential import Potential
 from gso.typing import Array, Flags, Ints
 
 #: Conductance across creases, relative to that of a strip as wide as an edge is long.
 _ACROSS = 0.05
+#: Conductance along edges between vertices that seams avoid, relative to that of equilateral
+#: triangles.
+_AVOIDED = 4.0
 #: Shares of an edge next to its ends in which a boundary goes through the end.
 _SNAP = 0.2
 #: Cosine between normals, and smallest angle in radians, of triangles of a flipped edge.
@@ -60,6 +63,10 @@ class Divided(NamedTuple):
         """Return points (n + k, 3) for those of the mesh that was divided (n, 3)."""
         return with_points(points, self.ends, self.shares)
 
+    def lines(self, lines: Ints) -> Ints:
+        """Return edges for lines (k, 2) of the mesh that was divided."""
+        return lines_through(lines, self.ends, len(self.mesh.vertices) - len(self.ends))
+
 
 @dataclass(frozen=True, eq=False)
 class Regions:
@@ -69,10 +76,14 @@ class Regions:
     ----------
     mesh : Mesh
     creases : ndarray of int, (k, 2)
+        Edges that boundaries prefer.
+    avoided : ndarray of bool, (n,), optional
+        Vertices between which they should not run.
     """
 
     mesh: Mesh
     creases: Ints
+    avoided: Flags | None = None
 
     @cached_property
     def opened(self) -> Cut:
@@ -94,10 +105,15 @@ class Regions:
     @cached_property
     def _stiffness(self) -> csr_matrix:
         pairs = self.opened.seams.transpose(0, 2, 1).reshape(-1, 2)
+        w = np.full(len(pairs), 0.5 * _ACROSS)
+        if self.avoided is not None and self.avoided.any():
+            edges = self.opened.mesh.edges
+            edges = edges[self.avoided[self.opened.vertex[edges]].all(axis=1)]
+            pairs = np.concatenate([pairs, edges])
+            w = np.concatenate([w, np.full(len(edges), _AVOIDED / np.sqrt(3.0))])
         if not len(pairs):
             return self.potential.stiffness
         i, j = pairs.T
-        w = np.full(len(pairs), 0.5 * _ACROSS)
         n = len(self.opened.vertex)
         links = coo_matrix(
             (np.r_[w, w, -w, -w], (np.r_[i, j, i, j], np.r_[i, j, j, i])), shape=(n, n)

@@ -19,6 +19,7 @@ from gso.seams.options import PieceSettings
 from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
 from gso.seams.tree import Ground
+from gso.seams.wanted import Wanted
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 
@@ -57,7 +58,7 @@ def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result
     """Search for the fewest cuts whose pieces become developable within the allowed distance."""
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
     if _at_scale(ground):
-        trial = divided_within(ground.mesh, settings)
+        trial = divided_within(ground.mesh, settings, Wanted.of(ground))
         return _patterns(ground, trial.shape, settings), trial.result
     tried: list[_Attempt] = []
     for level in _levels(tried, len(ground.kept)):
@@ -79,8 +80,9 @@ def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result
 
 def _at_scale(ground: Ground) -> bool:
     """Whether the search runs on a copy at the scale of the distance, which coarse designs are."""
-    free = ground.mirror is None and ground.factor is None and not len(ground.kept)
-    return free and ground.mesh.is_triangles and int(ground.mesh.used.sum()) >= _MANY
+    return (
+        ground.mirror is None and ground.mesh.is_triangles and int(ground.mesh.used.sum()) >= _MANY
+    )
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:

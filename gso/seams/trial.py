@@ -19,6 +19,7 @@ from gso.seams.cutting import cut
 from gso.seams.joint_solve import solve_pieces
 from gso.seams.kinds import Edges
 from gso.seams.regions import Divided, with_flips
+from gso.seams.sheets import Sheet
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
@@ -36,7 +37,7 @@ _FOLD, _ROOT, _MOST = 0.02, 0.25, 2.5
 _FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.4, 12.0, 0.002, 12
 #: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
 #: rounds in which vertices of folds move between their neighbours.
-_BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, 2.0, 12, 10
+_BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (2.0, 6.0), 12, 10
 #: Excess up to which little is missing.
 _CLOSE = 1.08
 #: Angle in degrees from which on an edge of a folded face is flipped.
@@ -73,17 +74,23 @@ class Trial:
         The region of each piece.
     result : Result or None
         The joint solve; None where no vertex is inside a piece.
+    sheets : tuple of Sheet or None
+        The pattern of each piece; None where there is none.
     distance, strain : ndarray, (p,)
         Largest distance of each piece from the design, and strain of its pattern, over what is
         allowed.
+    width : float
+        Of the diffusion that made the boundaries fair.
     """
 
     label: Ints
     pieces: Pieces
     region: Ints
     result: Result | None
+    sheets: tuple[Sheet | None, ...]
     distance: Array
     strain: Array
+    width: float = 0.0
 
     @cached_property
     def folded(self) -> Ints:
@@ -116,6 +123,15 @@ class Trial:
         np.maximum.at(out, self.region, self.excess)
         return out
 
+    @cached_property
+    def lengths(self) -> Array:
+        """Length of each pattern (p,); infinite where there is none."""
+        return np.array([np.inf if sheet is None else sheet.size[0] for sheet in self.sheets])
+
+    def necks(self, limit: float) -> Array:
+        """Return the width of each piece's narrowest place, or a limit where that is less."""
+        return np.array([limit if sheet is None else sheet.neck(limit) for sheet in self.sheets])
+
     @property
     def shape(self) -> Pieces:
         """The pieces after the solve."""
@@ -127,7 +143,7 @@ def _solved(pieces: Pieces, result: Result | None) -> Pieces:
     return pieces if result is None or result.pieces is None else result.pieces
 
 
-def options_for(allowed: Allowed) -> Options:
+def options_for(distance: float) -> Options:
     """Return the settings of a joint solve within a distance."""
     own = Options().for_pieces()
     return replace(
@@ -135,7 +151,7 @@ def options_for(allowed: Allowed) -> Options:
         w_fairness=_FAIR * own.w_fairness,
         w_curvature=_CURVED * own.w_curvature,
         w_proximity=_NEAR * own.w_proximity,
-        reach=_REACH * allowed.distance,
+        reach=_REACH * distance,
         w_reach=_WEIGHT,
     )
 
@@ -149,6 +165,7 @@ def tried(
     iterations: int | None = None,
     repairs: int = 1,
     executor: Executor = SERIAL,
+    width: float = 0.0,
 ) -> Trial:
     """Solve and measure pieces.
 
@@ -169,8 +186,10 @@ def tried(
         How often a result that nearly holds is solved again; twice as often if little is missing.
     executor : Executor
         Lays pieces flat; the result does not depend on it.
+    width : float
+        Of the diffusion that made the boundaries fair.
     """
-    own = options_for(allowed)
+    own = options_for(allowed.distance)
     found: list[Trial] = []
     for number in range(2 * repairs + 1):
         begin = Start(start, iterations=iterations if start is not None else None)
@@ -179,9 +198,7 @@ def tried(
             result = solve_pieces(pieces, asked)
         except MeshError:
             result = None
-        # Flips change the areas of pieces, and so perhaps their order.
-        region = divided.label[[part.faces[0] for part in pieces.parts]]
-        trial = _measured(label, pieces, region, result, allowed, executor)
+        trial = _measured(label, divided, pieces, result, allowed, executor, width)
         found.append(trial)
         if trial.holds or result is None or not _repairable(trial):
             break
@@ -207,32 +224,40 @@ def _stricter(options: Options, trial: Trial) -> Options:
     if far > 1.0 and options.reach is not None:
         options = replace(options, reach=options.reach * _BELOW / far)
     if strain > 1.0:
-        options = replace(options, w_curvature=_MORE * options.w_curvature)
+        more = float(np.clip(strain, *_MORE))
+        options = replace(options, w_curvature=more * options.w_curvature)
     return options
 
 
 def _measured(
     label: Ints,
+    divided: Divided,
     pieces: Pieces,
-    region: Ints,
     result: Result | None,
     allowed: Allowed,
     executor: Executor,
+    width: float,
 ) -> Trial:
-    shape, design, near = _solved(pieces, result), allowed.design, allowed.near
-    meshes = [part.mesh for part in shape.parts]
-    strain = np.array(executor.map(_strain, meshes))
-    distance = np.array([float(near.distances(mesh.vertices).max()) for mesh in meshes])
+    # Flips change the areas of pieces, and so perhaps their order.
+    region = divided.label[[part.faces[0] for part in pieces.parts]]
+    shape = _solved(pieces, result)
+    sheets = tuple(executor.map(_laid, [part.mesh for part in shape.parts]))
+    strain = np.array([np.inf if one is None else one.strain for one in sheets]) / allowed.strain
+    return Trial(label, pieces, region, result, sheets, _away(shape, allowed), strain, width)
+
+
+def _away(shape: Pieces, allowed: Allowed) -> Array:
+    """Return the largest distance of each piece (p,) from the design over the allowed one."""
+    design, near, most = allowed.design, allowed.near, allowed.distance
+    distance = np.array([float(near.distances(p.mesh.vertices).max()) for p in shape.parts])
     # And back: from the design to the nearest piece.
     face, away = Nearest(shape.design).nearest(design.vertices[design.used])
     np.maximum.at(distance, shape.of_face[face], away)
-    if _DOUBTFUL * allowed.distance < distance.max() <= allowed.distance:
+    if _DOUBTFUL * most < distance.max() <= most:
         # Points inside faces may be farther away than all vertices.
-        most = metrics.largest_distance(design, shape.design)
-        distance[distance.argmax()] = max(most, float(distance.max()))
-    return Trial(
-        label, pieces, region, result, distance / allowed.distance, strain / allowed.strain
-    )
+        largest = metrics.largest_distance(design, shape.design)
+        distance[distance.argmax()] = max(largest, float(distance.max()))
+    return np.asarray(distance / most)
 
 
 def _with_flips(trial: Trial) -> Pieces:
@@ -281,8 +306,9 @@ def _untangled(trial: Trial) -> Array:
     return np.asarray(points)
 
 
-def _strain(mesh: Mesh) -> float:
-    """Return the largest strain of a piece's pattern; infinite where there is none."""
+def _laid(mesh: Mesh) -> Sheet | None:
+    """Lay a piece flat; None where that fails."""
     pattern = lay_out(mesh)
-    found = np.inf if pattern is None else metrics.strains(mesh, pattern.flat)["strain_max"]
-    return found if np.isfinite(found) else np.inf
+    if pattern is None or pattern.is_cut or not np.isfinite(pattern.flat).all():
+        return None
+    return Sheet(mesh, pattern.flat)

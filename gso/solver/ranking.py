@@ -12,8 +12,9 @@ from gso.typing import Flags, Ints
 
 Int32 = NDArray[np.int32]
 
-#: Largest table, columns times diagonals, for which no entries are sorted.
-_LARGEST_TABLE = 100_000_000
+#: Largest table, columns times diagonals, for which no entries are sorted: at all, and over the
+#: number of entries.
+_LARGEST_TABLE, _CELLS = 100_000_000, 2
 #: Elements per block: the pairs of a block stay in the processor's cache.
 _BLOCK = 8192
 
@@ -69,7 +70,8 @@ def rank(groups: list[Pairs], size: int) -> tuple[list[Int32], Ints, Ints]:
     for group in groups:
         for _, low, high in group.blocks():
             used[high - low] = True
-    if size * int(used.sum()) > _LARGEST_TABLE:
+    total = sum(e * m for e, m in (group.shape for group in groups))
+    if size * int(used.sum()) > min(_LARGEST_TABLE, _CELLS * total):
         return _by_sorting(groups, size)
     return _by_table(groups, size, used)
 

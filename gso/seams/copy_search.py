@@ -1,0 +1,267 @@
+"""What a search for regions does on the copy of a design: estimate, merge, divide and measure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gso.cut_pieces import Pieces
+from gso.mesh.topology import edge_keys, pair_keys
+from gso.seams.candidates import disks
+from gso.seams.coarse_copy import CoarseCopy
+from gso.seams.compact_patches import patches
+from gso.seams.distance_estimate import DistanceEstimates
+from gso.seams.kinds import edges_between
+from gso.seams.merging import Merging
+from gso.seams.options import PieceSettings
+from gso.seams.potential import Potential
+from gso.seams.regions import Divided, Regions, numbered
+from gso.seams.tree import Ground
+from gso.seams.trial import Allowed, Trial, tried
+from gso.typing import Array, Flags, Ints
+
+#: Share of what is allowed that pieces of the copy may use.
+_ROOM = 0.95
+#: Bounds on the estimated distance over the allowed one that are tried, in turn.
+LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
+#: Numbers of patches, and how much compact pieces are preferred.
+_PATCHES, _COMPACT = (100, 200), (2.0, 5.0)
+#: Range of the factor on the bound of a piece that is divided.
+_SMALLER = (0.35, 0.8)
+#: Width of the diffusion that makes boundaries fair: in mean edges of the copy, and in necks where
+#: a smallest one is given.
+_WIDTH, _NECK = 1.5, 0.4
+#: Factors on the cost of seams along creases and wanted lines, and where they should not run.
+_CHEAPER, _DEARER = 0.3, 20.0
+#: Angle defect, in degrees, from which on a vertex is the apex of a cone.
+_APEX = 60.0
+#: Area of a region over the mean, below which it goes to a neighbour at first.
+_SMALL = 0.08
+#: Area of a region over the whole below which it always goes to a neighbour.
+_TINY = 0.003
+#: Share of faces that seams should avoid from which on these regions are divided all the same.
+_HALF = 0.5
+#: How often pieces that nearly hold are solved again.
+_REPAIRS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class CopySearch:
+    """What the search knows about a design.
+
+    Attributes
+    ----------
+    copy : CoarseCopy
+    allowed : Allowed
+        What pieces of the design may use.
+    settings : PieceSettings
+    """
+
+    copy: CoarseCopy
+    allowed: Allowed
+    settings: PieceSettings
+
+    @cached_property
+    def of_copy(self) -> Allowed:
+        """What pieces of the copy may use."""
+        return replace(self.allowed, design=self.copy.mesh, distance=_ROOM * self.allowed.distance)
+
+    @cached_property
+    def beside(self) -> tuple[Ints, Array]:
+        """Faces (e, 2) on both sides of each inner edge of the copy, and its length (e,)."""
+        mesh, he = self.copy.mesh, self.copy.mesh.half_edges
+        k = he.interior
+        length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
+        return np.stack([he.face[k], he.face[he.twin[k]]], axis=1), length
+
+    @cached_property
+    def joinable(self) -> Flags:
+        """Whether each inner edge (e,) of the copy may vanish, and is not cut in any case."""
+        mesh, he = self.copy.mesh, self.copy.mesh.half_edges
+        own = edge_keys(he.origin[he.interior], he.dest[he.interior], len(mesh.vertices))
+        kept = self.copy.wanted_of_copy.kept
+        return ~np.isin(own, pair_keys(kept, len(mesh.vertices)))
+
+    def neighbours(self, label: Ints) -> Ints:
+        """Return the pairs (p, 2) of regions with a common boundary, none of it to be cut."""
+        sides = np.sort(label[self.beside[0]], axis=1)
+        apart = sides[:, 0] != sides[:, 1]
+        fixed = np.unique(sides[apart & ~self.joinable], axis=0).tolist()
+        pairs = np.unique(sides[apart], axis=0).tolist()
+        return np.array([p for p in pairs if p not in fixed], np.int64).reshape(-1, 2)
+
+    @cached_property
+    def ground(self) -> Ground:
+        """The copy with what is asked of its seams."""
+        mesh, lines, wanted = self.copy.mesh, self.copy.lines, self.copy.wanted_of_copy
+        factor = np.where(wanted.avoided[mesh.edges].all(axis=1), _DEARER, 1.0)
+        if len(lines):
+            factor[mesh.edge_numbers(lines[:, 0], lines[:, 1])] = _CHEAPER
+        return Ground.of(mesh, factor if (factor != 1.0).any() else None, wanted.kept)
+
+    @cached_property
+    def regions(self) -> Regions:
+        """Regions of the copy."""
+        return Regions(self.copy.mesh, self.copy.lines, self.copy.wanted_of_copy.avoided)
+
+    @cached_property
+    def base_regions(self) -> Regions:
+        """Regions of the base."""
+        return Regions(self.copy.smooth, self.copy.creases, self.copy.wanted.avoided)
+
+    @cached_property
+    def estimate(self) -> DistanceEstimates:
+        """Estimates the distance of faces, over the allowed one."""
+        return DistanceEstimates(self.ground.estimates, self.regions, self.allowed.distance)
+
+    @cached_property
+    def width(self) -> float:
+        """Width of the diffusion that makes boundaries fair."""
+        least = _NECK * (self.settings.min_neck or 0.0)
+        return max(_WIDTH * float(self.copy.mesh.edge_lengths.mean()), least)
+
+    @cached_property
+    def first_patches(self) -> list[Ints]:
+        mesh, lines = self.copy.mesh, self.copy.lines
+        return [patches(mesh, count, lines) for count in _PATCHES]
+
+    def merged(
+        self, label: Ints, level: Array, compact: float, ground: Ground | None = None
+    ) -> Ints:
+        """Merge regions up to a bound (m,) on the estimate, given for each face."""
+        bound = np.log(np.maximum(level, 1e-12))
+
+        def estimate(faces: Ints) -> float | None:
+            found = self.estimate(faces)
+            area = self.regions.face_area[faces]
+            return found and found / float(np.exp(area @ bound[faces] / area.sum()))
+
+        merging = Merging(ground or self.ground, label, 1.0, compact, estimate)
+        return numbered(merging.run())
+
+    def divided(self, level: float) -> list[Ints]:
+        """Return regions for a bound on the estimate, the best first."""
+        bound = np.full(len(self.copy.mesh.faces), level)
+        found = []
+        for label in self.first_patches:
+            for compact in _COMPACT:
+                own = self.regions.fair(self.merged(label, bound, compact), self.width)
+                found.append(self.without_small(own, _SMALL))
+        return sorted(found, key=self.value)
+
+    def fair(self, label: Ints, width: float) -> Ints:
+        """Make the boundaries of regions fair that nearly are."""
+        return self.regions.fair(label, width, rounds=1)
+
+    def value(self, label: Ints) -> tuple[int, float, float]:
+        """Rank regions by their number and the length of their boundaries."""
+        faces, length = self.beside
+        seam = float(length[np.ptp(label[faces], axis=1) > 0].sum())
+        size = float(np.sqrt(self.regions.face_area.sum()))
+        return self.settings.value(int(label.max()) + 1, seam / size)
+
+    def without_small(self, label: Ints, share: float = 0.0) -> Ints:
+        """Merge small regions with their neighbours.
+
+        They are smaller than a share of the mean, or so small that nobody would cut them.
+        """
+        faces, length = self.beside
+        while True:
+            size = np.bincount(label, self.regions.face_area)
+            small = np.flatnonzero(size < max(share * size.mean(), _TINY * size.sum()))
+            a, b = label[faces].T
+            for own in small[np.argsort(size[small], kind="stable")].tolist():
+                out, back = (
+                    x & self.joinable for x in ((a == own) & (b != own), (b == own) & (a != own))
+                )
+                shared = np.bincount(
+                    np.r_[b[out], a[back]], np.r_[length[out], length[back]], len(size)
+                )
+                if shared.any():
+                    label = numbered(np.where(label == own, shared.argmax(), label))
+                    break
+            else:
+                return label
+
+    def measured(self, label: Ints, width: float | None = None) -> Trial:
+        """Solve and measure regions of the copy."""
+        regions, width = self.regions, self.width if width is None else width
+        divided = regions.cut_between(regions.fields(label, width))
+        return tried(
+            label,
+            divided,
+            self.opened(divided, self.copy.wanted_of_copy.kept, self.apexes),
+            self.of_copy,
+            repairs=_REPAIRS,
+            executor=self.settings.executor,
+            width=width,
+        )
+
+    @cached_property
+    def apexes(self) -> Ints:
+        """Vertices of the copy at the apex of a cone, to which a piece has to be cut."""
+        mesh = self.copy.mesh
+        sharp = self.ground.potential.curvature > np.radians(_APEX)
+        sharp &= ~mesh.half_edges.boundary_vertex
+        sharp[self.copy.lines] = False
+        return np.flatnonzero(sharp)
+
+    @cached_property
+    def base_apexes(self) -> Ints:
+        """The sharpest vertices of the base near the apexes of the copy."""
+        base = self.copy.base
+        if not len(self.apexes):
+            return self.apexes
+        curvature = np.where(base.half_edges.boundary_vertex, -np.inf, Potential(base).curvature)
+        reach = float(self.copy.mesh.edge_lengths.mean())
+        near = cKDTree(base.vertices).query_ball_point(self.copy.mesh.vertices[self.apexes], reach)
+        own = self.copy.ids[self.apexes]
+        sharpest = [
+            max([int(vertex), *sorted(others)], key=lambda k: curvature[k])
+            for vertex, others in zip(own, near, strict=True)
+        ]
+        return np.unique(sharpest)
+
+    def opened(self, divided: Divided, kept: Ints, apexes: Ints) -> Pieces:
+        """Cut between regions, along kept edges, to the apexes of cones, and until all is disks."""
+        mesh, edges = divided.mesh, edges_between(divided.mesh, divided.label)
+        edges = np.concatenate([edges, divided.lines(kept)])
+        ground = Ground.of(mesh)
+        reached = mesh.half_edges.boundary_vertex.copy()
+        reached[edges] = True
+        own = mesh.components
+        for apex in apexes.tolist():
+            if not reached[own == own[apex]].any():
+                # The first apex of a closed component: the others are joined to it.
+                reached[apex] = True
+            if reached[apex]:
+                continue
+            line = ground.paths.cheapest(apex, reached, np.ones(len(mesh.edges)))
+            edges = np.concatenate([edges, np.stack([line[:-1], line[1:]], axis=1)])
+            reached[line] = True
+        return disks(ground, edges)
+
+    def smaller(self, trial: Trial, excess: Array) -> Ints:
+        """Divide the regions whose excess (k,) is more than one."""
+        label, mesh = trial.label, self.copy.mesh
+        bad = excess > 1.0
+        level = np.zeros(len(label))
+        for own in np.flatnonzero(bad):
+            faces = np.flatnonzero(label == own)
+            found = self.estimate(faces)
+            found = LEVELS[0] if found is None else max(found, LEVELS[-1] / 2)
+            level[faces] = found * float(np.clip(1.0 / excess[own], *_SMALLER))
+        kept = np.concatenate([edges_between(mesh, label), self.copy.lines])
+        finer = patches(mesh, max(_PATCHES[-1], 4 * len(excess)), kept)
+        start = numbered(np.where(bad[label], finer + len(excess), label))
+        ground, regions = self.ground, self.regions
+        avoided = self.copy.wanted_of_copy.avoided[mesh.faces].all(axis=1)
+        if avoided[bad[label]].mean() > _HALF:
+            # What seams should avoid is too large for one piece.
+            ground = Ground.of(mesh, kept=ground.kept)
+            regions = Regions(mesh, self.copy.lines)
+        new = self.merged(start, level, _COMPACT[0], ground)
+        return self.without_small(regions.fair(new, self.width, rounds=1))
