@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from gso.cut_pieces import Pieces
 from gso.mesh.topology import edge_keys, pair_keys
 from gso.seams.candidates import disks
+from gso.seams.carrying import base_fields
 from gso.seams.coarse_copy import CoarseCopy
 from gso.seams.compact_patches import patches
 from gso.seams.distance_estimate import DistanceEstimates
@@ -19,6 +20,7 @@ from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
 from gso.seams.potential import Potential
 from gso.seams.regions import Divided, Regions, numbered
+from gso.seams.symmetry import Mirror, Plane
 from gso.seams.tree import Ground
 from gso.seams.trial import Allowed, Trial, tried
 from gso.typing import Array, Flags, Ints
@@ -58,11 +60,14 @@ class CopySearch:
     allowed : Allowed
         What pieces of the design may use.
     settings : PieceSettings
+    plane : Plane or None
+        Plane of symmetry that regions are to have.
     """
 
     copy: CoarseCopy
     allowed: Allowed
     settings: PieceSettings
+    plane: Plane | None = None
 
     @cached_property
     def of_copy(self) -> Allowed:
@@ -113,6 +118,16 @@ class CopySearch:
         return Regions(self.copy.smooth, self.copy.creases, self.copy.wanted.avoided)
 
     @cached_property
+    def mirror(self) -> Mirror | None:
+        """The plane of symmetry of the regions of the copy."""
+        return None if self.plane is None else Mirror(self.regions, self.plane)
+
+    @cached_property
+    def base_mirror(self) -> Mirror | None:
+        """The plane of symmetry of the regions of the base."""
+        return None if self.plane is None else Mirror(self.base_regions, self.plane)
+
+    @cached_property
     def estimate(self) -> DistanceEstimates:
         """Estimates the distance of faces, over the allowed one."""
         return DistanceEstimates(self.ground.estimates, self.regions, self.allowed.distance)
@@ -149,7 +164,7 @@ class CopySearch:
         for label in self.first_patches:
             for compact in _COMPACT:
                 own = self.regions.fair(self.merged(label, bound, compact), self.width)
-                found.append(self.without_small(own, _SMALL))
+                found.append(self.alike(self.without_small(own, _SMALL)))
         return sorted(found, key=self.value)
 
     def fair(self, label: Ints, width: float) -> Ints:
@@ -189,7 +204,10 @@ class CopySearch:
     def measured(self, label: Ints, width: float | None = None) -> Trial:
         """Solve and measure regions of the copy."""
         regions, width = self.regions, self.width if width is None else width
-        divided = regions.cut_between(regions.fields(label, width))
+        fields = regions.fields(label, width)
+        if self.mirror is not None:
+            fields = self.mirror.symmetric(fields, self.mirror.partners(label))
+        divided = regions.cut_between(fields)
         return tried(
             label,
             divided,
@@ -258,10 +276,21 @@ class CopySearch:
         finer = patches(mesh, max(_PATCHES[-1], 4 * len(excess)), kept)
         start = numbered(np.where(bad[label], finer + len(excess), label))
         ground, regions = self.ground, self.regions
-        avoided = self.copy.wanted_of_copy.avoided[mesh.faces].all(axis=1)
+        avoided = np.asarray(self.copy.wanted_of_copy.avoided[mesh.faces].all(axis=1))
         if avoided[bad[label]].mean() > _HALF:
             # What seams should avoid is too large for one piece.
             ground = Ground.of(mesh, kept=ground.kept)
             regions = Regions(mesh, self.copy.lines)
         new = self.merged(start, level, _COMPACT[0], ground)
-        return self.without_small(regions.fair(new, self.width, rounds=1))
+        return self.alike(self.without_small(regions.fair(new, self.width, rounds=1)))
+
+    def alike(self, label: Ints) -> Ints:
+        """Make regions symmetric if they are to be."""
+        return label if self.mirror is None else self.without_small(self.mirror.alike(label))
+
+    def base_fields(self, label: Ints, width: float) -> Array:
+        """Diffuse regions of the copy on the base: fields (p, k)."""
+        fields = base_fields(self.base_regions, self.regions, self.copy, label, width)
+        if self.mirror is None or self.base_mirror is None:
+            return fields
+        return self.base_mirror.symmetric(fields, self.mirror.partners(label))

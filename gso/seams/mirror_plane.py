@@ -17,6 +17,14 @@ _DIAGONALS = ((1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1
 _PAIRS = tuple((i, j, s) for i, j in ((0, 1), (0, 2), (1, 2)) for s in (1.0, -1.0))
 
 
+def directions(axes: Array) -> list[Array]:
+    """Return normals of planes to try: principal axes (columns), coordinate axes, diagonals."""
+    # Diagonal planes matter where two principal axes are equal, as on a square.
+    diagonals = [np.array(d) / np.sqrt(2.0) for d in _DIAGONALS]
+    principal = [(axes.T[i] + s * axes.T[j]) / np.sqrt(2.0) for i, j, s in _PAIRS]
+    return [*axes.T, *np.eye(3), *diagonals, *principal]
+
+
 def mirror_of(mesh: Mesh) -> Ints:
     """Find the mirror image of each vertex (n,).
 
@@ -33,10 +41,7 @@ def mirror_of(mesh: Mesh) -> Ints:
     _, axes = np.linalg.eigh(points.T @ points)
     (a, b), length = mesh.edges.T, float(mesh.edge_lengths.mean())
     worst, crossed = np.inf, False
-    # Diagonal planes matter where two principal axes are equal, as on a square.
-    diagonals = [np.array(d) / np.sqrt(2.0) for d in _DIAGONALS]
-    principal = [(axes.T[i] + s * axes.T[j]) / np.sqrt(2.0) for i, j, s in _PAIRS]
-    for normal in (*axes.T, *np.eye(3), *diagonals, *principal):
+    for normal in directions(axes):
         partner, far = _partners(points, normal)
         worst = min(worst, far / length)
         if far > _TOLERANCE * length or (partner[partner] != np.arange(len(used))).any():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.mesh.topology import label_components
 from gso.seams.budgets import Budgets
 from gso.seams.copy_search import CopySearch
 from gso.seams.regions import numbered
@@ -73,7 +74,8 @@ class Merges:
         while pairs and solves > 0:
             solves -= 1
             search.settings.say(f"{len(best.pieces)} pieces, without {len(pairs)} of them")
-            trial = search.measured(self._joined(pairs), best.width)
+            label = self._joined(pairs)
+            trial = search.measured(label, best.width)
             if trial.holds and Budgets(trial, search.settings).missing <= before:
                 self.found.append(trial)
                 break
@@ -93,16 +95,20 @@ class Merges:
         search, best = self._search, self.best
         width = factor * search.width
         search.settings.say(f"{len(best.pieces)} pieces, wider at their necks")
-        trial = search.measured(search.fair(best.label, width), width)
+        trial = search.measured(search.alike(search.fair(best.label, width)), width)
         missing = [Budgets(one, search.settings).missing for one in (trial, best)]
         if trial.holds and missing[0] < missing[1]:
             self.found.append(trial)
 
     def _joined(self, pairs: list[_Pair]) -> Ints:
-        out = self.best.label.copy()
-        for a, b in pairs:
-            out[self.best.label == b] = a
-        return self._search.fair(numbered(out), self.best.width)
+        search, label = self._search, self.best.label
+        a, b = np.array(pairs).T
+        if search.mirror is not None:
+            partner = search.mirror.partners(label)
+            a, b = np.r_[a, partner[a]], np.r_[b, partner[b]]
+        count = int(label.max()) + 1
+        joined = label_components(count, a, b)[label]
+        return search.alike(search.fair(numbered(joined), self.best.width))
 
     def _pairs(self, likely: float, some: Ints | None = None) -> list[_Pair]:
         """Choose pairs of neighbours to merge, those with the least estimate first.

@@ -10,6 +10,7 @@ import numpy as np
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
+from gso.mesh import Mesh
 from gso.pipeline import strains_of
 from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
@@ -18,6 +19,7 @@ from gso.seams.joint_solve import solve_pieces
 from gso.seams.options import PieceSettings
 from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
+from gso.seams.symmetry import Plane
 from gso.seams.tree import Ground
 from gso.seams.wanted import Wanted
 from gso.tasks.developable import Options
@@ -54,11 +56,21 @@ class _Attempt:
     excess: float
 
 
-def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result | None]:
-    """Search for the fewest cuts whose pieces become developable within the allowed distance."""
+def reshaped(
+    ground: Ground, settings: PieceSettings, plane: Plane | None = None
+) -> tuple[Candidate, Result | None]:
+    """Search for the fewest cuts whose pieces become developable within the allowed distance.
+
+    Parameters
+    ----------
+    ground : Ground
+    settings : PieceSettings
+    plane : Plane, optional
+        Plane of symmetry of the seams, for designs :func:`at_scale`.
+    """
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
-    if _at_scale(ground):
-        trial = divided_within(ground.mesh, settings, Wanted.of(ground))
+    if at_scale(ground.mesh) and ground.mirror is None:
+        trial = divided_within(ground.mesh, settings, Wanted.of(ground), plane)
         return _patterns(ground, trial.shape, settings), trial.result
     tried: list[_Attempt] = []
     for level in _levels(tried, len(ground.kept)):
@@ -78,11 +90,9 @@ def reshaped(ground: Ground, settings: PieceSettings) -> tuple[Candidate, Result
     return _patterns(ground, best.pieces, settings), best.result
 
 
-def _at_scale(ground: Ground) -> bool:
+def at_scale(mesh: Mesh) -> bool:
     """Whether the search runs on a copy at the scale of the distance, which coarse designs are."""
-    return (
-        ground.mirror is None and ground.mesh.is_triangles and int(ground.mesh.used.sum()) >= _MANY
-    )
+    return mesh.is_triangles and int(mesh.used.sum()) >= _MANY
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:

@@ -13,13 +13,14 @@ import numpy as np
 
 from gso.mesh import Mesh
 from gso.seams.budgets import Budgets
-from gso.seams.carrying import base_fields, base_start
+from gso.seams.carrying import base_start
 from gso.seams.coarse_copy import CoarseCopy
 from gso.seams.copy_search import LEVELS, CopySearch
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.region_merges import Merges
+from gso.seams.symmetry import Plane
 from gso.seams.trial import Allowed, Trial, tried
 from gso.seams.wanted import Wanted
 from gso.typing import Flags, Ints
@@ -37,7 +38,12 @@ _REPAIRS = 3
 _SAME = 0.95
 
 
-def divided_within(design: Mesh, settings: PieceSettings, wanted: Wanted | None = None) -> Trial:
+def divided_within(
+    design: Mesh,
+    settings: PieceSettings,
+    wanted: Wanted | None = None,
+    plane: Plane | None = None,
+) -> Trial:
     """Find few pieces of a triangle mesh that become developable within a distance.
 
     Parameters
@@ -46,6 +52,8 @@ def divided_within(design: Mesh, settings: PieceSettings, wanted: Wanted | None 
     settings : PieceSettings
     wanted : Wanted, optional
         What is asked of the seams.
+    plane : Plane, optional
+        Plane of symmetry that they are to have.
 
     Returns
     -------
@@ -56,7 +64,8 @@ def divided_within(design: Mesh, settings: PieceSettings, wanted: Wanted | None 
         raise ValueError("the search within a distance needs max_deviation")
     settings.say("a copy at the scale of the distance")
     allowed = Allowed(design, settings.max_deviation, settings.max_strain)
-    search = CopySearch(CoarseCopy.of(design, allowed.distance, wanted), allowed, settings)
+    copy = CoarseCopy.of(design, allowed.distance, wanted)
+    search = CopySearch(copy, allowed, settings, plane)
     return _of_design(search, _of_copy(search))
 
 
@@ -139,9 +148,9 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
 
 def _carried(search: CopySearch, trial: Trial) -> Trial:
     """Carry the regions of a trial back to the design, and solve them."""
-    copy, base = search.copy, search.base_regions
-    fields = base_fields(base, search.regions, copy, trial.label, trial.width)
-    divided = base.cut_between(fields)
+    copy = search.copy
+    fields = search.base_fields(trial.label, trial.width)
+    divided = search.base_regions.cut_between(fields)
     smooth = search.opened(divided, copy.wanted.kept, search.base_apexes)
     start = base_start(copy, trial, smooth)
     design = smooth.design.replaced(divided.moved(copy.base.vertices))

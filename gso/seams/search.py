@@ -34,10 +34,11 @@ from gso.seams.exact_pieces import exact_pieces
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, prices, too_large
-from gso.seams.reshaping import reshaped
+from gso.seams.reshaping import at_scale, reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
+from gso.seams.symmetry import plane_of
 from gso.seams.tree import Ground
 from gso.tasks import check
 from gso.typing import Array, Ints, MeshLike
@@ -107,8 +108,9 @@ def pieces(
     darts : bool
         Whether seams may end inside a piece, as in cloth and paper.
     symmetric : bool
-        Make the seams symmetric; the mesh has to be, vertex by vertex. Then pieces that overlap
-        themselves are cut, and not joined again elsewhere.
+        Make the seams symmetric. The design has to be: as a surface, where a triangle mesh of 1,000
+        vertices or more may change its shape, and otherwise vertex by vertex; then pieces that
+        overlap themselves are cut, and not joined again elsewhere.
     min_neck : float or str, optional
         Smallest width of a piece, as for `max_deviation`. When not given, a tenth of the root of
         the area is aimed at, and less is taken where the strain cannot be held otherwise.
@@ -218,7 +220,9 @@ def _searched(
     workers: int | None,
 ) -> Segmentation:
     """Search for seams, and judge the pieces."""
-    mirror = mirror_of(design) if symmetric else None
+    scaled = settings.max_deviation is not None and at_scale(design)
+    plane = plane_of(design) if symmetric and scaled else None
+    mirror = mirror_of(design) if symmetric and not scaled else None
     ground = Ground.of(design, factor, kept, mirror)
     ground = replace(ground, kept=ground.mirrored(kept))
     max_size, aim = settings.max_size, settings
@@ -234,7 +238,7 @@ def _searched(
             # This process does its share.
             others = max((processors() if workers is None else workers) - 1, 0)
             with open_executor(others) as executor:
-                changed = reshaped(ground, replace(aim, executor=executor))
+                changed = reshaped(ground, replace(aim, executor=executor), plane)
         out = packed(*changed, ground.mesh, ground.kept, settings)
     return replace(out, notes=(*out.notes, said)) if said else out
 
