@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import gso
 from gso import metrics
+from gso.cli import main
 from gso.mesh import Mesh, Nearest
 from gso.seams import Edges, Path, Polyline, Slice
 from tests.conftest import rotation, saddle, shuffled
@@ -121,3 +123,78 @@ def test_a_polyline_stays_on_one_component():
     )
     with pytest.raises(gso.MeshError, match="no seam"):
         gso.cut(two, Polyline(two.vertices[[0, 30]]))
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_edges_and_faces_of_a_polyline_are_those_of_the_mesh(triangles):
+    grid = gso.as_mesh(np.dstack([*np.mgrid[:9.0, :13.0], np.zeros((9, 13))]))
+    mesh = Mesh(grid.vertices, grid.triangles) if triangles else grid
+    line = Polyline([[0, 6.3, 0], [4, 5.8, 0], [8, 6.2, 0]])
+    ends = line.edges(mesh)
+    np.testing.assert_allclose(mesh.vertices[ends][..., 1], 6.0)
+    assert sorted(mesh.vertices[ends][..., 0].mean(axis=1)) == [k + 0.5 for k in range(8)]
+    corners = mesh.vertices[mesh.faces[line.faces(mesh)]]
+    middle = corners.mean(axis=1)
+    assert set(np.floor(middle[:, 0])) == set(range(8))
+    assert set(np.floor(middle[:, 1])) == {5, 6}
+    below = Polyline([[0.2, 0.4, 0], [2.8, 0.4, 0]]).faces(mesh)
+    assert len(below) == (6 if triangles else 3)
+    assert set(np.floor(mesh.vertices[mesh.faces[below]].mean(axis=1)[:, 1])) == {0}
+
+
+def test_seams_follow_and_avoid_lines_in_space():
+    mesh = ball(10)
+    turn = np.linspace(-1.2, 1.2, 9)
+    line = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
+    some = {"max_strain": 0.15, "darts": True}
+    found = [
+        gso.pieces(mesh, **some, along=along)
+        for along in ([line], Polyline(line), line, Polyline(line).edges(mesh))
+    ]
+    for one in found[1:]:
+        np.testing.assert_array_equal(one.edges, found[0].edges)
+    away = gso.pieces(mesh, **some, avoid=[line])
+    same = gso.pieces(mesh, **some, avoid=Polyline(line).faces(mesh))
+    np.testing.assert_array_equal(away.edges, same.edges)
+
+    def near(one):
+        middle = one.design.vertices[one.edges].mean(axis=1)
+        far = np.linalg.norm(middle[:, None] - line, axis=2).min(axis=1)
+        return float(one.lengths[far < 0.2].sum())
+
+    assert near(found[0]) > near(away)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"along": [[[0, 0, 1], [0, 0, 3]]]}, "along, line 1: point 1 of a polyline is 2"),
+        (
+            {"avoid": [Polyline([[0, 0, 1], [1, 0, 0]]), Polyline([[0, 0, 1], [0, 9, 0]])]},
+            "avoid, line 2: point 1 of a polyline is 8",
+        ),
+        ({"along": [[[0, 0, 1], [0, 0.01, 1]]]}, "line 1: all points .* nearest to vertex"),
+        ({"along": [[0.5, 1.5]]}, "along has pairs that are not whole numbers"),
+        ({"along": "seam"}, "along is str; it must be edges as pairs of vertices, or polylines"),
+        ({"avoid": [Slice([0, 0, 0], [0, 0, 1])]}, "avoid, line 1 is a Slice"),
+        ({"avoid": [[0, 1, 2], [3, 4]]}, "avoid is list; it must be faces"),
+        ({"avoid": [10**6]}, "avoid names face 1000000; the mesh has"),
+        ({"avoid": [0.5]}, "avoid must be a list of faces"),
+    ],
+)
+def test_wrong_lines_are_named(given, said):
+    with pytest.raises(gso.OptionError, match=said):
+        gso.pieces(ball(6), **given)
+
+
+def test_the_command_reads_lines_of_obj_files(tmp_path):
+    mesh = ball(8)
+    gso.save(mesh, tmp_path / "ball.obj")
+    gso.io.save_lines([[[0, 0, 1], [1, 0, 0], [0, 0, -1]]], tmp_path / "lines.obj")
+    words = ["pieces", str(tmp_path / "ball.obj"), "-o", str(tmp_path / "out")]
+    some = ["--max-strain", "20%", "--darts", "--along"]
+    done = CliRunner().invoke(main, [*words, *some, str(tmp_path / "lines.obj")])
+    assert done.exit_code == 0, done.output
+    done = CliRunner().invoke(main, [*words, "--avoid", str(tmp_path / "ball.obj")])
+    assert done.exit_code == 1
+    assert "--avoid: " in done.output and "has no polylines" in done.output

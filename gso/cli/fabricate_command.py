@@ -42,6 +42,14 @@ if TYPE_CHECKING:
 @shared.cut
 @shared.keep
 @shared.keep_groups
+@shared.max_pieces
+@shared.min_neck
+@shared.min_size
+@shared.symmetric
+@shared.seams_along("--along")
+@shared.avoid
+@shared.seam_effort
+@shared.constraints
 @shared.min_radius
 @click.option("--thickness", metavar="MM", type=shared.MM, help="Thickness of the sheet.")
 @click.option(
@@ -181,6 +189,12 @@ def fabricate(
         face="inside" if given.pop("inside_up") else "outside",
         **_thickness(**taken("thickness", "k_factor", "face", "bend_radius", "bend_table")),
     )
+    for option in ("along", "avoid"):
+        given[option] = file_options.lines(f"--{option}", given[option])
+    if (held := given.pop("constraints")) is not None:
+        from gso.constraints import read_constraints
+
+        given["constraints"] = read_constraints(held)
     meshes = [file_options.source(name, weld) for name in inputs]
     if rotations != "any" and not rotations.isdecimal():
         raise OptionError(f"--rotations is {rotations!r}; it must be a number or any")

@@ -15,6 +15,7 @@ from gso.errors import OptionError
 if TYPE_CHECKING:
     from gso.io import Unwelded
     from gso.mesh import Mesh
+    from gso.typing import Array
 
 
 def _length(ctx: click.Context, option: click.Parameter, value: float | None) -> float | None:
@@ -110,6 +111,27 @@ def scale_of(
     if extent <= 0:
         raise OptionError(f"the design has no height along {up}; name another axis with --up")
     return as_length(height, "--height", diagonal=float("nan"), unit=unit) / extent
+
+
+def lines(option: str, file: str | None) -> list[Array] | None:
+    """Read the polylines (k, 3) that an option names a file of.
+
+    Raises
+    ------
+    OptionError
+        The file has none.
+    """
+    from gso import io
+
+    if file is None:
+        return None
+    found = io.polylines(file)
+    if not found:
+        raise OptionError(
+            f"{option}: {file} has no polylines; give an OBJ file with l elements, as CAD and "
+            "modelling programs write curves"
+        )
+    return found
 
 
 def spare(inputs: Iterable[str | None], outputs: Iterable[str | None], force: bool) -> None:

@@ -25,27 +25,20 @@ if TYPE_CHECKING:
 )
 @shared.max_strain
 @shared.max_deviation
-@click.option("--max-pieces", metavar="N", type=int, help="Budget of pieces.")
+@shared.max_pieces
 @click.option(
     "--seam", metavar="X", type=float, help="Budget of all seams, relative to the root of the area."
 )
 @shared.darts
-@click.option("--symmetric", is_flag=True, help="Symmetric seams.")
-@click.option("--min-neck", metavar="LENGTH", type=shared.LENGTH, help="Smallest width of a piece.")
-@click.option(
-    "--min-size", metavar="LENGTH", type=shared.LENGTH, help="Smallest length of a piece."
-)
+@shared.symmetric
+@shared.min_neck
+@shared.min_size
+@shared.seams_along("--along")
+@shared.avoid
 @shared.sheet
 @shared.keep_groups
 @click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
-@click.option(
-    "--effort",
-    type=click.Choice(("draft", "standard", "best")),
-    default="standard",
-    show_default=True,
-    help="How long to search with --max-deviation on triangles: a first look, the usual, or for "
-    "fewer pieces.",
-)
+@shared.seam_effort
 @shared.unit
 @shared.workers
 @file_options.weld
@@ -59,6 +52,8 @@ def pieces(
     force: bool,
     quiet: bool,
     keep_groups: bool,
+    along: str | None,
+    avoid: str | None,
     **given: Any,
 ) -> None:
     """Find seams of the design IN, and write its pieces and their patterns to DIR.
@@ -77,8 +72,12 @@ def pieces(
     if os.path.isfile(folder):
         raise OptionError(f"{folder} is a file; -o names a folder")
     outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json")]
-    file_options.spare([name], outputs, force)
+    file_options.spare([name, along, avoid], outputs, force)
     mesh = file_options.load(name, weld)
+    given |= {
+        "along": file_options.lines("--along", along),
+        "avoid": file_options.lines("--avoid", avoid),
+    }
     with words() as say:
         found = search(mesh, keep=Groups() if keep_groups else None, callback=say, **given)
     save(found, folder, given["unit"])

@@ -175,6 +175,40 @@ keep_groups = click.option(
     help="Cut between the groups (g) of IN in any case; without two of them, between its objects "
     "(o) or materials (usemtl).",
 )
+max_pieces = click.option("--max-pieces", metavar="N", type=int, help="Budget of pieces.")
+min_neck = click.option(
+    "--min-neck", metavar="LENGTH", type=LENGTH, help="Smallest width of a piece."
+)
+min_size = click.option(
+    "--min-size", metavar="LENGTH", type=LENGTH, help="Smallest length of a piece."
+)
+symmetric = click.option("--symmetric", is_flag=True, help="Symmetric seams.")
+seam_effort = click.option(
+    "--effort",
+    type=click.Choice(("draft", "standard", "best")),
+    default="standard",
+    show_default=True,
+    help="How long to search for seams where the shape of triangles may change: a first look, the "
+    "usual, or for fewer pieces.",
+)
+
+
+def seams_along(name: str) -> Callable[[_Command], _Command]:
+    """Return the option for lines that seams should follow."""
+    return click.option(
+        name,
+        metavar="FILE",
+        type=click.Path(),
+        help="OBJ file of polylines (l) on the design that seams should follow.",
+    )
+
+
+avoid = click.option(
+    "--avoid",
+    metavar="FILE",
+    type=click.Path(),
+    help="OBJ file of polylines (l) on the design: seams should keep away from the faces there.",
+)
 unit = click.option(
     "--unit", type=click.Choice(tuple(MILLIMETRES)), default="mm", help="Unit of the coordinates."
 )

@@ -71,6 +71,13 @@ class _StripsJob(Job):
     metavar="DIRECTION",
     help='Direction that strips run along: x, y, z, or a vector such as "1,1,0".',
 )
+@shared.max_pieces
+@shared.min_neck
+@shared.min_size
+@shared.symmetric
+@shared.seams_along("--seams-along")
+@shared.avoid
+@shared.seam_effort
 @shared.sheet
 @shared.workers
 @shared.plot
@@ -91,10 +98,10 @@ def strips(
     """Make strips of planar faces near the design IN, and write them to OUT.
 
     The design is tried as one surface. Where that does not hold --max-deviation, it is cut into
-    pieces, and each piece becomes strips; it is not cut where --strips is a number, or with --flats
-    or --constraints. Pieces that no strips follow keep a pattern with a strain of at most
-    --max-strain, 0.1 % when it is not given. The exit code is 0 only if the result is usable;
-    otherwise the reasons are printed.
+    pieces, and each piece becomes strips; it is not cut where --strips is a number, or with
+    --along, --flats or --constraints. Pieces that no strips follow keep a pattern with a strain of
+    at most --max-strain, 0.1 % when it is not given. The exit code is 0 only if the result is
+    usable; otherwise the reasons are printed.
     """
     own = {option: given.pop(option) for option in ("unit", "quiet", "weld", "force")}
     count = given["strips"]
@@ -108,5 +115,9 @@ def strips(
         from gso.constraints import read_constraints
 
         given["constraints"] = read_constraints(constraints)
-    job = _StripsJob.of(given, own, constraints)
+    read = constraints, given["seams_along"], given["avoid"]
+    for option in ("seams_along", "avoid"):
+        said = f"--{option.replace('_', '-')}"
+        given[option] = file_options.lines(said, given[option])
+    job = _StripsJob.of(given, own, *read)
     click.get_current_context().exit(0 if single(job, name, out, plot, table) else 1)

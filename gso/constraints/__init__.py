@@ -18,7 +18,7 @@ from gso.constraints.glue import Glue
 from gso.constraints.linear import Reduction, reduce
 from gso.constraints.on_curve import OnCurve, SlidingBoundary
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
-from gso.constraints.read import add, kinds, read_constraints
+from gso.constraints.read import add, kinds, read_constraints, record_of
 from gso.constraints.ruling import Ruling
 from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
@@ -53,5 +53,6 @@ __all__ = [
     "kinds",
     "listed",
     "read_constraints",
+    "record_of",
     "reduce",
 ]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields
+from typing import Any
+
+import numpy as np
 
 from gso.constraints.base import Constraint
 from gso.errors import OptionError
 from gso.spelling import check_keywords, choices, nearest
-from gso.typing import AnyPath
+from gso.typing import AnyPath, Json
 
 #: Constraints from outside the package.
 _ADDED: list[type[Constraint]] = []
@@ -32,6 +35,23 @@ def add(kind: type[Constraint]) -> None:
     if kind.__name__ in kinds():
         raise OptionError(f"{kind.__name__!r} is taken among the constraints; rename the class")
     _ADDED.append(kind)
+
+
+def record_of(constraint: Constraint) -> Json:
+    """Return a constraint as an entry of such a file.
+
+    >>> from gso.constraints import Handle
+    >>> record_of(Handle([0], np.zeros((1, 3)), weight=2.0))
+    {'type': 'Handle', 'ids': [0], 'positions': [[0.0, 0.0, 0.0]], 'weight': 2.0}
+    """
+    named = {f.name: getattr(constraint, f.name) for f in fields(constraint)}  # type: ignore[arg-type]
+    return {"type": type(constraint).__name__, **{k: _plain(v) for k, v in named.items()}}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def read_constraints(path: AnyPath) -> list[Constraint]:

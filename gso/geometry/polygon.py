@@ -67,6 +67,22 @@ def arc_lengths(line: Array) -> Array:
     return np.asarray(np.r_[0.0, np.cumsum(steps)])
 
 
+def densified(line: Array, step: float) -> Array:
+    """Insert points (n, d) into a line (k, d), so that no two are farther apart than a step.
+
+    >>> densified(np.array([[0.0, 0], [1, 0], [1, 0.2]]), 0.5).tolist()
+    [[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, 0.2]]
+    """
+    if len(line) < 2:
+        return line
+    size = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    count = np.maximum(np.ceil(size / step), 1).astype(np.int64)
+    first = np.repeat(np.arange(len(size)), count)
+    share = (np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)) / count[first]
+    inner = line[first] + share[:, None] * (line[first + 1] - line[first])
+    return np.concatenate([inner, line[-1:]])
+
+
 def rectangle(flat: Array) -> tuple[float, tuple[float, float]]:
     """Return the smallest rectangle about points (n, 2): its angle, its length and its width.
 

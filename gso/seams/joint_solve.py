@@ -18,6 +18,7 @@ from gso.pipeline.component_solves import solve_mesh
 from gso.result import Result
 from gso.seams import joint_bounds
 from gso.seams.chains import chains
+from gso.seams.design_constraints import of_design
 from gso.solver import Callback
 from gso.tasks import Limits
 from gso.tasks.base import Options
@@ -70,7 +71,8 @@ def solve_pieces(
         Its task is "developable", or "flatten" for the patterns of the pieces as they are. Its
         start is in the numbering of the design.
     constraints : sequence of Constraint
-        In the numbering of the design.
+        On the design: its boundary does not include the seams. Those of flat patterns are on the
+        mesh that is cut open.
     callback : callable, optional
         Called after every iteration.
 
@@ -106,13 +108,15 @@ def _solve(
 ) -> Result:
     """Solve pieces, which are close to the design by the weights of the energy only."""
     design = pieces.opened.mesh
-    joined = constraints_of(pieces) if request.task == "developable" else []
+    wanted = list(constraints)
+    if request.task == "developable":
+        wanted = [*constraints_of(pieces), *of_design(constraints, pieces.design)]
     start = request.start
     if start.points is not None:
         points = np.asarray(getattr(start.points, "vertices", start.points), float)
         if len(points) == len(pieces.design.vertices):
             start = replace(start, points=points[pieces.opened.vertex])
-    result = solve_mesh(replace(request, start=start), design, [*joined, *constraints], callback)
+    result = solve_mesh(replace(request, start=start), design, wanted, callback)
     # Advice to join what was cut open is no use here.
     own = tuple(note for note in result.notes if note not in design.notes)
     result.notes = pieces.design.notes + own

@@ -6,19 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh
-from gso.mesh.topology import pair_keys
 from gso.quantities import as_positive
 from gso.spelling import choices
-from gso.typing import Array, Ints
 from gso.verdict import Code
 
-#: Factors on the cost of edges in regions to avoid, and on edges to follow.
-_AVOID, _FOLLOW = 20.0, 0.2
 #: Largest strain where none is given: of a shape that stays, and of one that may change.
 STAYS, CHANGES = 0.01, 0.001
 #: Smallest neck, relative to the root of the area, unless given.
@@ -128,47 +123,3 @@ class PieceSettings:
 def too_large(mesh: Mesh, sheet: tuple[float, float]) -> bool:
     """Tell whether an edge is longer than the diagonal of a sheet, so that no cut helps."""
     return bool(mesh.edge_lengths.max(initial=0.0) > np.hypot(*sheet))
-
-
-def prices(mesh: Mesh, along: ArrayLike | None, avoid: ArrayLike | None) -> Array | None:
-    """Return the factor on the cost of each edge of ``mesh.edges``; None if all are one."""
-    along, avoid = (None if x is None or np.size(x) == 0 else x for x in (along, avoid))
-    if along is None and avoid is None:
-        return None
-    ends, n = mesh.edges, len(mesh.vertices)
-    factor = np.ones(len(ends))
-    if avoid is not None:
-        faces = _faces(avoid, len(mesh.faces))
-        corners = mesh.faces[faces]
-        inside = np.zeros(n, bool)
-        inside[corners[corners >= 0]] = True
-        factor[inside[ends].all(axis=1)] *= _AVOID
-    if along is not None:
-        wanted = np.asarray(along)
-        if wanted.ndim != 2 or wanted.shape[1] != 2 or wanted.dtype.kind not in "iu":
-            raise OptionError(
-                f"along has shape {wanted.shape}; it must be pairs of vertices (k, 2)"
-            )
-        beyond = wanted[((wanted < 0) | (wanted >= n)).any(axis=1)]
-        if len(beyond):
-            a, b = beyond[0]
-            raise OptionError(f"along has the pair {a}-{b}; vertices are 0 to {n - 1}")
-        keys, own = (pair_keys(pairs, n) for pairs in (wanted, ends))
-        missing = np.flatnonzero(~np.isin(keys, own))
-        if missing.size:
-            a, b = wanted[missing[0]]
-            raise OptionError(f"along has the pair {a}-{b}, which is no edge of a face")
-        factor[np.isin(own, keys)] *= _FOLLOW
-    return factor
-
-
-def _faces(given: ArrayLike, count: int) -> Ints:
-    faces = np.atleast_1d(np.asarray(given))
-    if faces.dtype == bool and faces.shape == (count,):
-        return np.flatnonzero(faces)
-    if faces.ndim != 1 or faces.dtype.kind not in "iu":
-        raise OptionError("avoid must be a list of faces, or a mask of all faces")
-    bad = faces[(faces < 0) | (faces >= count)]
-    if bad.size:
-        raise OptionError(f"avoid names face {bad[0]}; the mesh has {count}")
-    return faces

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
+from gso.geometry.polygon import densified
 from gso.mesh import Mesh, Nearest, Paths
 from gso.mesh.slicing import divided, followed
 from gso.seams.kinds import Placed, Seam
@@ -16,6 +18,8 @@ from gso.typing import Array, Ints
 
 #: Largest distance of a point from the surface, relative to the diagonal.
 _NEAR = 0.05
+#: Distance of places at which faces below a polyline are looked for, in mean edge lengths.
+_STEP = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,39 +51,47 @@ class Polyline(Seam):
     INSERTS = True
 
     def placed(self, mesh: Mesh) -> Placed:
+        if not mesh.is_triangles:
+            return super().placed(mesh)
+        none = np.empty((0, 2), np.int64)
+        inserted, own = [none], none
+        for k, start, goal in self._steps(mesh, self._checked(mesh)):
+            count = len(mesh.vertices)
+            mesh, more, line = _straight(mesh, start, goal)
+            inserted.append(more)
+            own = np.concatenate([followed(own, more, count), _pairs(line, k, start, goal)])
+        return Placed(mesh, np.concatenate(inserted), own)
+
+    def edges(self, mesh: Mesh) -> Ints:
+        """Return the edges (e, 2) of a mesh that are close to it; no vertex is inserted."""
         points = self._checked(mesh)
+        found = []
+        for k, start, goal in self._steps(mesh, points):
+            line = _along_rows(mesh, points[[k, (k + 1) % len(points)]], start, goal)
+            found.append(_pairs(line, k, start, goal))
+        return np.concatenate(found)
+
+    def faces(self, mesh: Mesh) -> Ints:
+        """Return the faces (k,) of a mesh that it passes over."""
+        points, table = self._checked(mesh), mesh.faces
+        line = np.concatenate([points, points[:1]]) if self.closed else points
+        quads = np.flatnonzero(table[:, 3] >= 0) if table.shape[1] == 4 else np.empty(0, np.int64)
+        triangles = np.concatenate([table[:, :3], table[quads][:, [0, 2, -1]]])
+        owner = np.concatenate([np.arange(len(table)), quads])
+        step = _STEP * float(mesh.edge_lengths.mean())
+        place = Nearest.of(mesh.vertices, triangles).locate(densified(line, step))[0]
+        return np.unique(owner[place])
+
+    def _steps(self, mesh: Mesh, points: Array) -> list[tuple[int, int, int]]:
+        """Return the number of each segment, and the vertices that it leads from and to."""
         ids = _nearest_vertices(mesh, points)
-        stops = np.r_[ids, ids[:1]] if self.closed else ids
         if (ids == ids[0]).all():
             raise OptionError(
                 f"all points of the polyline are nearest to vertex {ids[0]}: it is shorter than an "
-                "edge of the mesh, so there is nothing to cut"
+                "edge of the mesh, and names none"
             )
-        inserted, edges = [], []
-        for k, (start, goal) in enumerate(
-            zip(stops[:-1].tolist(), stops[1:].tolist(), strict=True)
-        ):
-            if start == goal:
-                continue
-            if mesh.is_triangles:
-                mesh, more, line = _straight(mesh, start, goal)
-                inserted.append(more)
-            else:
-                line = _along_rows(mesh, points[[k, (k + 1) % len(points)]], start, goal)
-            if line is None:
-                raise MeshError(
-                    f"no seam on the surface leads from point {k} of the polyline to the next "
-                    f"(vertices {start} and {goal})"
-                )
-            edges.append(np.stack([line[:-1], line[1:]], axis=1))
-        none = np.empty((0, 2), np.int64)
-        own = none
-        count = len(mesh.vertices) - sum(map(len, inserted))
-        for k, line in enumerate(edges):
-            more = inserted[k] if inserted else none
-            own = np.concatenate([followed(own, more, count), line])
-            count += len(more)
-        return Placed(mesh, np.concatenate([none, *inserted]), own)
+        stops = (np.r_[ids, ids[:1]] if self.closed else ids).tolist()
+        return [(k, a, b) for k, (a, b) in enumerate(pairwise(stops)) if a != b]
 
     def _checked(self, mesh: Mesh) -> Array:
         try:
@@ -107,6 +119,16 @@ def _nearest_vertices(mesh: Mesh, points: Array) -> Ints:
     used = np.flatnonzero(mesh.used)
     nearest: Ints = used[cKDTree(mesh.vertices[used]).query(points)[1]]
     return nearest
+
+
+def _pairs(line: Ints | None, number: int, start: int, goal: int) -> Ints:
+    """Return the edges (e, 2) of a path, which is None where there is none."""
+    if line is None:
+        raise MeshError(
+            f"no seam on the surface leads from point {number} of the polyline to the next "
+            f"(vertices {start} and {goal})"
+        )
+    return np.stack([line[:-1], line[1:]], axis=1)
 
 
 def _straight(mesh: Mesh, start: int, goal: int) -> tuple[Mesh, Ints, Ints | None]:

@@ -30,10 +30,11 @@ from gso.seams.candidates import (
 from gso.seams.cutting import cut
 from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
+from gso.seams.edge_prices import Avoid, Follow, prices
 from gso.seams.exact_pieces import exact_pieces
 from gso.seams.kinds import Seam
 from gso.seams.mirror_plane import mirror_of
-from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, prices, too_large
+from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, too_large
 from gso.seams.reshaping import at_scale, reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
@@ -72,8 +73,8 @@ def pieces(
     sheet: tuple[Length, Length] | None = None,
     unit: str = "mm",
     keep: Kept = None,
-    along: ArrayLike | None = None,
-    avoid: ArrayLike | None = None,
+    along: Follow | None = None,
+    avoid: Avoid | None = None,
     denoise: bool = False,
     as_it_is: bool = True,
     effort: str = "standard",
@@ -124,10 +125,13 @@ def pieces(
         Unit of the coordinates.
     keep : Seam, iterable of Seam, array_like (e, 2), or Pieces, optional
         Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
-    along : array_like of int, (k, 2), optional
-        Edges that seams should follow.
-    avoid : array_like, optional
-        Faces that seams should keep away from: indices, or a mask of all faces.
+    along : array_like of int (k, 2), array_like (k, 3), Seam, or sequence of these, optional
+        What seams should follow: edges, the points of polylines, or seams such as
+        :class:`gso.seams.Polyline`. Points are moved to the nearest vertices, and polylines to
+        edges close to them; they are at most 5 % of the diagonal from the surface.
+    avoid : array_like of int (k,), of bool (m,), or (k, 3), Polyline, or sequence, optional
+        What seams should keep away from: faces, a mask of all faces, or polylines, which are the
+        faces that they pass over.
     denoise : bool
         Denoise the design first, such as a scan.
     as_it_is : bool

@@ -15,9 +15,10 @@ from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
 from gso.recognition import Recognised
 from gso.result import StripsResult
+from gso.seams.seam_request import SeamRequest
 from gso.verdict import compare, crosses_itself
 from gso.verdict.surface_checks import crossed
-from gso.workshop import measurements
+from gso.workshop import constrained, measurements
 from gso.workshop.designs import Design
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.mixed_panels import mixed
@@ -49,12 +50,15 @@ def made(
     workers : int, optional
         Number of processes for the pieces; one for each processor when not given.
     """
+    constrained.check_formulation(given, settings)
     given = _without_poles(given)
 
     def named(said: str) -> None:
         say(f"{given.name}: {said}")
 
-    exact = _exact(given, settings)
+    # A design that is developable as it is does not stay where it does not meet constraints.
+    stays = constrained.holds(given, given.mesh, soft=True)
+    exact = _exact(given, settings) if stays else None
     if exact is not None and (
         given.sheet is not None or not exact.reasons or crosses_itself(exact.reasons)
     ):
@@ -71,7 +75,8 @@ def made(
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        if exact is None:
+        # Parts have other vertices, and a plane of symmetry of their own.
+        if exact is None and not (settings.symmetric or given.constraints):
             exact = _mixed(given, settings, named, workers)
             if exact is not None and not exact.reasons:
                 return exact
@@ -124,9 +129,17 @@ def _without_poles(given: Design) -> Design:
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order))
     new = rank[number]
-    joined = Mesh(mesh.vertices[first[order]], collapse(mesh.faces, new).faces)
-    kept, uncut = (ids[ids[:, 0] != ids[:, 1]] for ids in (new[given.kept], new[given.uncut]))
-    return replace(given, mesh=joined, kept=kept, uncut=uncut)
+    left = collapse(mesh.faces, new)
+    joined = Mesh(mesh.vertices[first[order]], left.faces)
+    if given.constraints:
+        a, b = mesh.edges[np.flatnonzero(short)[0]]
+        raise OptionError(
+            f"constraints: edge {a}-{b} of {given.name} has no length; merge its ends (weld) first"
+        )
+    ends = {name: new[getattr(given, name)] for name in ("kept", "uncut", "along")}
+    ends = {name: ids[ids[:, 0] != ids[:, 1]] for name, ids in ends.items()}
+    avoid = np.flatnonzero(np.isin(left.kept, given.avoid))
+    return replace(given, mesh=joined, avoid=avoid, **ends)
 
 
 def _exact(given: Design, settings: FabricationSettings) -> Made | None:
@@ -213,6 +226,8 @@ def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int
         limits,
         settings.max_size,
         given.kept,
+        given.constraints,
+        seams=_seams(given, settings),
         as_it_is=False,
         workers=workers,
         say=say,
@@ -245,9 +260,14 @@ def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int
     from gso.ruled.paneling.light_design import LightDesign
     from gso.tno import optimize
 
+    asked = _seams(given, settings)
     light = LightDesign.of(
-        given.mesh, settings.distance(given.mesh.diagonal), named=len(given.kept) > 0
+        given.mesh,
+        settings.distance(given.mesh.diagonal),
+        named=given.is_marked or bool(asked.preferences),
     )
+    # Seams of a design that is not symmetric are not symmetric: nothing else will do.
+    asked.searched(light.mesh)
     tried = []
     if not len(given.kept) and parametrization.flattens(light.mesh):
         say("as a whole")
@@ -256,6 +276,7 @@ def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int
             formulation=settings.formulation,
             max_deviation=light.allowed,
             max_strain=settings.strain,
+            constraints=given.constraints,
         )
         if result.pattern is not None:
             allowed = settings.distance(given.mesh.diagonal)
@@ -286,9 +307,10 @@ def _of_search(
     """Search for seams within a distance, and make a panel of each piece."""
     from gso.seams import pieces as search
 
+    asked = _seams(given, settings)
+    searched = asked.searched(mesh)
     found = search(
-        # On triangles seams need not follow edge rows.
-        Mesh(mesh.vertices, mesh.triangles),
+        searched,
         max_strain=settings.strain,
         max_deviation=allowed,
         darts=settings.darts,
@@ -298,7 +320,11 @@ def _of_search(
         as_it_is=False,
         workers=workers,
         callback=say,
+        **asked.keywords(mesh, searched),
     )
+    if given.constraints and allowed is not None:
+        say("constraints")
+        found = constrained.solved(given, found, settings, allowed)
     pattern = found.pattern
     if pattern is None:
         said = "; ".join(map(str, found.reasons))
@@ -307,6 +333,11 @@ def _of_search(
     record = measurements.of_pattern(given.mesh, found.design, pattern, settings, bound)
     one = of_surface(given.name, found.design, pattern, record | {"pieces": len(found)})
     return _bent(replace(one, reasons=found.reasons))
+
+
+def _seams(given: Design, settings: FabricationSettings) -> SeamRequest:
+    """Return what is asked of the seams of a design."""
+    return settings.seams(given.along, given.avoid)
 
 
 def _checked(made: Made, settings: FabricationSettings) -> Made:

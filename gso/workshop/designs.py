@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike
 
 from gso import io
 from gso.components import split
+from gso.constraints import Constraint, compile_constraints
 from gso.errors import MeshError, OptionError
 from gso.faults import crossings
 from gso.mesh import Mesh
+from gso.seams.edge_prices import Avoid, Follow, edges_to_follow, faces_to_avoid
 from gso.seams.kinds import Groups
 from gso.sheet_metal import sheet_solid
 from gso.typing import Ints, MeshLike
@@ -43,6 +45,12 @@ class Design:
         One side of a solid of sheet metal.
     kept, uncut : ndarray of int, (k, 2)
         Edges that are cut in any case, and that are not.
+    along : ndarray of int, (k, 2)
+        Edges that seams should follow.
+    avoid : ndarray of int, (k,)
+        Faces that seams should keep away from.
+    constraints : tuple of Constraint
+        What must hold where the shape changes, in the numbering of the mesh.
     notes : tuple of str
         What was changed or found in the file.
     reasons : tuple of Reason
@@ -58,6 +66,14 @@ class Design:
     reasons: tuple[Reason, ...] = ()
     sheet: float | None = None
     uncut: Ints = field(default_factory=_no_edges)
+    along: Ints = field(default_factory=_no_edges)
+    avoid: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    constraints: tuple[Constraint, ...] = ()
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether something is asked of this design that is not asked of its copies."""
+        return bool(len(self.kept) or len(self.along) or len(self.avoid) or self.constraints)
 
 
 def designs_of(
@@ -66,6 +82,9 @@ def designs_of(
     cut: ArrayLike | None = None,
     keep: ArrayLike | None = None,
     keep_groups: bool = False,
+    along: Follow | None = None,
+    avoid: Avoid | None = None,
+    constraints: Sequence[Constraint] = (),
     scale: float = 1.0,
 ) -> list[Design]:
     """Read designs, and divide them into components.
@@ -78,10 +97,14 @@ def designs_of(
     MeshError
         A design cannot be read, is a heap of loose faces, has no groups to cut between, or is a
         sheet whose thickness is not the same everywhere.
+    OptionError
+        What names places of a design is wrong, or there are several designs.
     """
     many = several(given)
-    if len(many) > 1 and np.size(cut or ()) + np.size(keep or ()):
-        raise OptionError("cut and keep name vertices of one design; give one design with them")
+    places = {"cut": cut, "keep": keep, "along": along, "avoid": avoid, "constraints": constraints}
+    named = [name for name, value in places.items() if not _is_empty(value)]
+    if len(many) > 1 and named:
+        raise OptionError(f"{named[0]} is about places of one design; give one design with it")
     out: list[Design] = []
     for number, one in enumerate(many, start=1):
         path = path_of(one)
@@ -89,6 +112,7 @@ def designs_of(
         stem = f"design{suffix}" if path is None else path.stem
         mesh, vertex = manifold_mesh(one)
         mesh.check_joined()
+        follow, away = edges_to_follow(mesh, along), faces_to_avoid(mesh, avoid)
         drawn, leaves = edges_along(mesh.vertices, mesh.edges, polylines_of(one))
         if scale != 1.0:
             mesh = mesh.replaced(scale * mesh.vertices)
@@ -98,6 +122,14 @@ def designs_of(
         )
         kept = np.concatenate([kept, drawn, *([Groups().edges(mesh)] if keep_groups else [])])
         components = split(mesh)
+        if constraints:
+            if len(components) > 1 or len(vertex) != len(np.unique(vertex)):
+                raise OptionError(
+                    f"constraints are about one surface, and {stem} has {len(components)} "
+                    "components; give one of them"
+                )
+            # Errors in them are found before anything is made.
+            compile_constraints(constraints, mesh)
         notes = tuple(f"{stem}: {note}" for note in (*mesh.notes, *leaves))
         met = np.zeros(len(mesh.faces), bool)
         if len(components) > 1:
@@ -125,7 +157,21 @@ def designs_of(
             if solid is None:
                 edges = seams[(seams >= 0).all(axis=1)]
                 held = held[(held >= 0).all(axis=1)]
-                out.append(Design(spelled(name), part.mesh, edges, notes, reasons, None, held))
+                lines = local[follow]
+                out.append(
+                    Design(
+                        spelled(name),
+                        part.mesh,
+                        edges,
+                        notes,
+                        reasons,
+                        None,
+                        held,
+                        lines[(lines >= 0).all(axis=1)],
+                        np.flatnonzero(np.isin(part.faces, away)),
+                        tuple(constraints),
+                    )
+                )
             else:
                 out.append(
                     Design(
@@ -138,6 +184,11 @@ def designs_of(
                 )
     names = different(design.name for design in out)
     return [replace(design, name=name) for design, name in zip(out, names, strict=True)]
+
+
+def _is_empty(given: object) -> bool:
+    """Whether an option was not given, or with nothing in it."""
+    return given is None or (isinstance(given, Sized) and len(given) == 0)
 
 
 def several(given: Designs) -> Sequence[MeshLike]:

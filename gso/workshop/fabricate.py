@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.constraints import Constraint, listed, record_of
 from gso.errors import OptionError
 from gso.exact import EXACT, as_it_is
 from gso.io import SPLINE_SUFFIXES, Solid, suffix_of
@@ -25,12 +26,14 @@ from gso.quantities import (
     as_strain,
     millimetres,
 )
+from gso.seams.edge_prices import Avoid, Follow
 from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
 from gso.wording import places
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
+from gso.workshop.constrained import check_formulation
 from gso.workshop.designs import Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
@@ -41,7 +44,7 @@ from gso.workshop.nesting import Rotations, checked_options, nest
 from gso.workshop.output_files import Drawings, written
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
-from gso.workshop.part_notes import guide_notes, outline_notes, strip_notes
+from gso.workshop.part_notes import guide_notes, outline_notes, seam_notes, strip_notes
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.seam_strips import no_such_seam
 from gso.workshop.solids import folded_solids
@@ -98,6 +101,14 @@ def fabricate(
     cut: ArrayLike | None = None,
     keep: ArrayLike | None = None,
     keep_groups: bool = False,
+    max_pieces: int | None = None,
+    min_neck: Length | None = None,
+    min_size: Length | None = None,
+    symmetric: bool = False,
+    along: Follow | None = None,
+    avoid: Avoid | None = None,
+    effort: str = "standard",
+    constraints: Sequence[Constraint] = (),
     min_radius: Length | None = None,
     finish: Finish = Finish(),  # noqa: B008
     marks: Sequence[ArrayLike] = (),
@@ -153,6 +164,24 @@ def fabricate(
     keep_groups : bool
         Whether to cut between the groups of faces (``g``) of an OBJ file in any case; without
         two of them, between its objects (``o``) or materials (``usemtl``).
+    max_pieces : int, optional
+        Budget of pieces that a design is cut into; each of them may be several strips.
+    min_neck, min_size : float or str, optional
+        Smallest width of a part at its narrowest place, and smallest length of a part, as for
+        `max_deviation`; a share is of the diagonal of all designs together.
+    symmetric : bool
+        Make the seams symmetric, see :func:`gso.pieces`.
+    along, avoid : array_like, Seam, or sequence of these, optional
+        What seams should follow, and what they should keep away from, on one design and in its
+        unit: edges or faces, or polylines as for :func:`gso.pieces`, such as mullions. Designs
+        that keep their shape are cut along their own faces.
+    effort : {"draft", "standard", "best"}
+        How long to search for seams, see :func:`gso.pieces`.
+    constraints : sequence of Constraint
+        What must hold, as for :func:`gso.tno.optimize`, on one design of one component; positions
+        are those of the scaled design. By "curvature" and "isometry" the pieces are found without
+        them and solved again with them. Strips ("ruled") take those of :func:`gso.strips`, and are
+        then not cut into pieces. "flatten" takes none.
     min_radius : float or str, optional
         Smallest radius that the surface may be bent to, as for `max_deviation`; a share is of the
         diagonal of all designs together.
@@ -235,7 +264,17 @@ def fabricate(
                 "out the unit"
             )
     place = Path(os.fsdecode(folder))
-    every = designs_of(designs, cut=cut, keep=keep, keep_groups=keep_groups, scale=scale)
+    held = tuple(listed(constraints))
+    every = designs_of(
+        designs,
+        cut=cut,
+        keep=keep,
+        keep_groups=keep_groups,
+        along=along,
+        avoid=avoid,
+        constraints=held,
+        scale=scale,
+    )
     thin = [design.name for design in every if step and design.sheet is None]
     if thin and finish.thickness is None:
         raise OptionError(
@@ -250,12 +289,19 @@ def fabricate(
         max_strips,
         darts,
         most,
-        None if min_radius is None else _radius(min_radius, meshes, unit),
+        _length(min_radius, "min_radius", meshes, unit),
         unit,
         bend_step,
         finish.pressed(per_unit),
         page,
+        max_pieces,
+        _length(min_neck, "min_neck", meshes, unit),
+        _length(min_size, "min_size", meshes, unit),
+        symmetric,
+        effort,
     )
+    for design in every:
+        check_formulation(design, settings)
     marks, holes = ([scale * np.asarray(line, float) for line in x] for x in (marks, holes))
     drawn: list[tuple[Sequence[Array], list[int]]] = [
         (given, check_lines(given, meshes, what, closed=what == "hole"))
@@ -263,7 +309,7 @@ def fabricate(
     ]
     earlier = opened(place, several(designs))
     # Marks are on one of several copies, so that these differ.
-    alone = len(marks) or len(holes) or any(len(design.kept) for design in every)
+    alone = len(marks) or len(holes) or any(design.is_marked for design in every)
     alone = alone or len({design.sheet for design in every}) > 1
     first = list(range(len(meshes))) if alone else origins(meshes)
     chosen = sorted(set(first))
@@ -298,6 +344,7 @@ def fabricate(
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
         said = [*strip_notes(fit.panels, record), *outline_notes(fit.panels, record)]
         said += without_tabs(bare) if asked.tabs else []
+        said += seam_notes(one, settings.seams(every[k].along, every[k].avoid))
         is_kept = one.record["deviation_max"] == 0.0
         if is_kept and settings.formulation == "ruled" and one.record["strain_max"] > EXACT:
             said.append(as_it_is(one.record["strain_max"]))
@@ -329,7 +376,13 @@ def fabricate(
     certificate = {
         "unit": "mm",
         "asked": plain(
-            {"unit": unit, "scale": scale, **settings.record(), "finish": finish.record()}
+            {
+                "unit": unit,
+                "scale": scale,
+                **settings.record(),
+                "constraints": [record_of(one) for one in held],
+                "finish": finish.record(),
+            }
         ),
         "versions": versions(),
         "designs": records,
@@ -391,10 +444,13 @@ def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:
     return tuple(reason for reason in why if reason not in through), notes
 
 
-def _radius(given: Length, meshes: Sequence[Mesh], unit: str) -> float:
+def _length(given: Length | None, name: str, meshes: Sequence[Mesh], unit: str) -> float | None:
+    """Return a length; a share is of the diagonal of all designs together."""
+    if given is None:
+        return None
     points = np.concatenate([mesh.vertices for mesh in meshes])
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    return as_length(given, "min_radius", diagonal=diagonal, unit=unit)
+    return as_length(given, name, diagonal=diagonal, unit=unit)
 
 
 def _words(reasons: Iterable[Reason]) -> list[Json]:

@@ -8,8 +8,9 @@ from gso.errors import OptionError
 from gso.quantities import Length, as_length, millimetres
 from gso.recognition import bend_step_of
 from gso.seams.options import CHANGES, STAYS
+from gso.seams.seam_request import SeamRequest
 from gso.spelling import choices
-from gso.typing import Json
+from gso.typing import Ints, Json
 
 FORMULATIONS = ("ruled", "curvature", "isometry", "flatten")
 
@@ -46,6 +47,15 @@ class FabricationSettings:
     page : (float, float) or None
         Length and width of a page that parts of designs that keep their shape fit if they can, in
         the unit of the files.
+    max_pieces : int or None
+        Largest number of pieces of a design.
+    min_neck, min_size : float or None
+        Smallest width of a part at its narrowest place, and smallest length of a part, in the unit
+        of the files.
+    symmetric : bool
+        Whether the seams of each design are to be symmetric.
+    effort : {"draft", "standard", "best"}
+        How long to search for seams.
     """
 
     formulation: str = "ruled"
@@ -59,6 +69,11 @@ class FabricationSettings:
     bend_step: Length | None = None
     press: float | None = None
     page: tuple[float, float] | None = None
+    max_pieces: int | None = None
+    min_neck: float | None = None
+    min_size: float | None = None
+    symmetric: bool = False
+    effort: str = "standard"
 
     def __post_init__(self) -> None:
         if self.formulation not in FORMULATIONS:
@@ -69,6 +84,11 @@ class FabricationSettings:
         bend_step_of(self.bend_step, 1.0, self.unit)
         if not (isinstance(self.max_strips, int) and 1 <= self.max_strips <= 64):
             raise OptionError(f"max_strips is {self.max_strips!r}; it must be 1 to 64")
+        if self.max_size is not None and (self.min_size or 0.0) > max(self.max_size):
+            raise OptionError(
+                f"min_size is {self.min_size!r}, more than the length of a sheet; lower it"
+            )
+        self.seams()
 
     def distance(self, diagonal: float) -> float:
         """Return the largest distance from a design with some diagonal, in its unit.
@@ -91,6 +111,26 @@ class FabricationSettings:
         """The largest strain that is allowed."""
         default = STAYS if self.formulation == "flatten" else CHANGES
         return default if self.max_strain is None else self.max_strain
+
+    def seams(self, along: Ints | None = None, avoid: Ints | None = None) -> SeamRequest:
+        """Return what is asked of the seams of a design.
+
+        Parameters
+        ----------
+        along : ndarray of int, (k, 2), optional
+            Edges that they should follow.
+        avoid : ndarray of int, (k,), optional
+            Faces that they should keep away from.
+        """
+        places = {"along": along, "avoid": avoid}
+        return SeamRequest(
+            self.max_pieces,
+            self.min_neck,
+            self.min_size,
+            self.symmetric,
+            self.effort,
+            **{name: ids for name, ids in places.items() if ids is not None},
+        )
 
     def record(self) -> Json:
         """Return it as JSON-compatible values."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
-from gso.geometry.polygon import anticlockwise
+from gso.geometry.polygon import anticlockwise, densified
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
 from gso.metrics import point_to_surface
@@ -83,7 +83,7 @@ def marked(
     most = max(panel.surface.diagonal for panel in panels) / _STEPS
     out: list[list[Array]] = [[] for _ in panels]
     for line in lines:
-        number, flat = to_pattern(wanted, _dense(_checked(line, 3), most))
+        number, flat = to_pattern(wanted, densified(_checked(line, 3), most))
         stops = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
         for a, b in pairwise(stops):
             if b - a > 1:
@@ -168,18 +168,6 @@ def check_lines(
             )
         out.append(number)
     return out
-
-
-def _dense(line: Array, most: float) -> Array:
-    """Divide the segments of a line that are longer than `most`."""
-    if len(line) < 2:
-        return line
-    size = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    count = np.maximum(np.ceil(size / most), 1).astype(np.int64)
-    first = np.repeat(np.arange(len(size)), count)
-    share = (np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)) / count[first]
-    inner = line[first] + share[:, None] * (line[first + 1] - line[first])
-    return np.concatenate([inner, line[-1:]])
 
 
 def _checked(points: ArrayLike, count: int) -> Array:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from gso import faults, metrics, rulings
+from gso.components import split
 from gso.errors import MeshError
 from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys, pair_keys
 from gso.metrics import Distances
 from gso.pattern import Pattern
+from gso.seams import Sheet
 from gso.typing import Json
-from gso.verdict import Code, Measurement, Reason, compare, merge
+from gso.verdict import Code, Measurement, Reason, compare, merge, ordered
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made, Panel
 
@@ -57,7 +59,7 @@ def of_pattern(
         "planarity_max": _planarity(surface),
         "overlaps": overlaps,
         "inverted": flips,
-        "pieces": len(pattern.mesh.boundary_loops),
+        "pieces": len(split(pattern.mesh)),
         "strips": [],
     }
 
@@ -97,10 +99,14 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
         widths = [mean_width([p.flat[loop] for loop in p.loops]) for p in joined]
         measured[Code.SMALL] = Measurement(areas / record["area"], "part", own)
         measured[Code.NARROW] = Measurement(np.array(widths) / record["size"], "part", own)
-    later = compare(measured, limits)
-    # The solve may have had another design in its place, or less room; and a strain that is too
-    # large is said as the record has it.
-    decided = {Code.DEVIATION} | ({Code.STRAIN} & {reason.code for reason in later})
+    asked = settings.seams()
+    sheets = [Sheet(panel.surface, panel.flat) for panel in made.panels]
+    later = ordered([*compare(measured, limits), *asked.reasons(record["pieces"], sheets, names)])
+    # The solve may have had another design in its place, or less room; pieces may have become
+    # other parts; and a strain that is too large is said as the record has it.
+    decided = {Code.DEVIATION, Code.PIECES, Code.NECK, Code.TOO_SHORT} | (
+        {Code.STRAIN} & {reason.code for reason in later}
+    )
     return merge(made.reasons, later, decided)
 
 

@@ -13,6 +13,7 @@ from gso.exact import developable_parts
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
 from gso.mesh.topology import edge_keys, pair_keys
+from gso.seams.seam_request import faces_within
 from gso.typing import Ints, Json
 from gso.verdict import compare
 from gso.verdict.surface_checks import crossed
@@ -44,8 +45,10 @@ def mixed(given: Design, settings: FabricationSettings, keep: _Make, change: _Ma
         has no such parts, or they cannot be made.
     """
     mesh = given.mesh
+    avoided = np.isin(np.arange(len(mesh.faces)), given.avoid)
     if mesh.grid_index is not None:
         mesh = Mesh(mesh.vertices, mesh.triangles)
+        avoided = faces_within(given.mesh, given.avoid, mesh)
     kept = developable_parts(mesh, settings.strain)
     if not kept.any() or kept.all():
         return None
@@ -59,10 +62,19 @@ def mixed(given: Design, settings: FabricationSettings, keep: _Make, change: _Ma
     for piece in pieces:
         local = np.full(len(mesh.vertices), -1)
         local[piece.vertices] = np.arange(len(piece.vertices))
-        edges = local[given.kept]
         keys = pair_keys(piece.mesh.edges, len(local))
-        edges = edges[np.isin(pair_keys(edges, len(local)), keys)]
-        part = replace(given, name=f"{given.name}-{piece.name}", mesh=piece.mesh, kept=edges)
+        kept_edges, along = (
+            edges[np.isin(pair_keys(edges, len(local)), keys)]
+            for edges in (local[given.kept], local[given.along])
+        )
+        part = replace(
+            given,
+            name=f"{given.name}-{piece.name}",
+            mesh=piece.mesh,
+            kept=kept_edges,
+            along=along,
+            avoid=np.flatnonzero(avoided[piece.faces]),
+        )
         made = (keep if kept[piece.faces[0]] else change)(part, own)
         if made is None:
             return None

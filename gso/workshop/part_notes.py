@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gso.seams.seam_request import SeamRequest, without_seams
 from gso.typing import Json
 from gso.workshop.certificate import chord
 from gso.workshop.fabrication_settings import FabricationSettings
-from gso.workshop.panels import Panel
+from gso.workshop.panels import Made, Panel
 
 #: Distance of outlines from smooth curves that a note is made of, relative to the design's size.
 _COARSE = 5e-4
@@ -66,6 +67,14 @@ def outline_notes(panels: Sequence[Panel], record: Json) -> list[str]:
         f"outlines are polygons, up to {far:.3g} mm from smooth curves through their corners; a "
         "finer design has finer outlines"
     ]
+
+
+def seam_notes(made: Made, asked: SeamRequest) -> list[str]:
+    """Return a note on preferences about seams of a design for which none were searched for."""
+    alone = made.record["pieces"] == 1
+    if not asked.preferences or not (alone or all(panel.is_kept for panel in made.panels)):
+        return []
+    return [without_seams(asked.preferences)]
 
 
 def guide_notes(records: Sequence[Json], settings: FabricationSettings) -> list[str]:

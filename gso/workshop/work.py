@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gso import io
+from gso.constraints import record_of
 from gso.errors import MeshError
 from gso.executors import open_executor
 from gso.io.json_file import plain
@@ -25,12 +26,14 @@ from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made
 
 #: Version of the files; those of another one are made again.
-_FORMAT = 9
+_FORMAT = 10
 
 
 def key(design: Design, settings: FabricationSettings) -> str:
     """Return what identifies the work on a design: its digest and what was asked."""
-    own = [digest(design.mesh), design.kept.tolist(), design.uncut.tolist(), design.sheet]
+    edges = [ids.tolist() for ids in (design.kept, design.uncut, design.along, design.avoid)]
+    held = [record_of(constraint) for constraint in design.constraints]
+    own = [digest(design.mesh), *edges, design.sheet, held]
     said = json.dumps([_FORMAT, version("gso"), *own, plain(settings.record())], sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 

@@ -25,7 +25,13 @@ from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
 from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
-from gso.ruled.paneling.sheet_strips import against_sheet, divided, longest_ruling, on_sheets
+from gso.ruled.paneling.sheet_strips import (
+    against_parts,
+    against_sheet,
+    divided,
+    longest_ruling,
+    on_sheets,
+)
 from gso.ruled.paneling.shop_notes import shop_notes
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import (
@@ -38,6 +44,8 @@ from gso.ruled.paneling.surface_strips import (
 )
 from gso.ruled.paneling.tried_strips import Tried
 from gso.seams import Edges, Segmentation, cut
+from gso.seams.edge_prices import Avoid, Follow, edges_to_follow, faces_to_avoid
+from gso.seams.seam_request import SeamRequest, without_seams
 from gso.solver import Callback
 from gso.tasks import Limits
 from gso.tasks.start import Start
@@ -60,6 +68,13 @@ def strips(
     constraints: Sequence[Constraint] = (),
     sheet: tuple[Length, Length] | None = None,
     along: str | ArrayLike | None = None,
+    max_pieces: int | None = None,
+    min_neck: Length | None = None,
+    min_size: Length | None = None,
+    symmetric: bool = False,
+    seams_along: Follow | None = None,
+    avoid: Avoid | None = None,
+    effort: str = "standard",
     unit: str = "mm",
     x0: MeshLike | Start | None = None,
     workers: int | None = 0,
@@ -147,7 +162,8 @@ def strips(
         The design cannot be used: it has several components, or it is closed, or has a handle,
         and may not be cut.
     OptionError
-        An option or constraint is wrong, or does not go with `along`.
+        An option or constraint is wrong, or does not go with `along`; or seams of pieces are asked
+        for, and the design is not cut into pieces that are to be found.
 
     Examples
     --------
@@ -158,7 +174,8 @@ def strips(
     >>> result.usable, result.ruled.strips, round(result.metrics["strain_max"], 9)
     (True, 1, 0.0)
     """
-    diagonal = _read(mesh).diagonal
+    design = _read(mesh)
+    diagonal = design.diagonal
 
     def length(value: Length | None, name: str) -> float | None:
         return None if value is None else as_length(value, name, diagonal=diagonal, unit=unit)
@@ -181,6 +198,15 @@ def strips(
         as_sheet(sheet, unit),
         constraints=constraints,
         along=Along.of(along),
+        seams=SeamRequest(
+            max_pieces,
+            length(min_neck, "min_neck"),
+            length(min_size, "min_size"),
+            symmetric,
+            effort,
+            _named_along(design, seams_along),
+            faces_to_avoid(design, avoid),
+        ),
         start=x0 if isinstance(x0, Start) else Start(x0),
         verdict=verdict,
         workers=workers,
@@ -196,10 +222,30 @@ def strips(
                 "along takes strips=2 or more, or max_deviation, a design that is not in pieces, "
                 "no constraints, and not lines=False"
             )
+    wanted = request.seams.preferences
+    if wanted and (isinstance(mesh, Pieces) or not request.may_be_cut):
+        raise OptionError(
+            f"{_own_names(wanted)[0]} is about seams that are searched for: it "
+            "takes a design that is not in pieces, and max_deviation, but no number of strips, "
+            "no flats, no constraints, and no direction (along)"
+        )
     result = lay_strips(mesh, request)
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=2)
     return result
+
+
+def _own_names(preferences: Sequence[str]) -> list[str]:
+    """Return the names that preferences of the search for pieces have here."""
+    return ["seams_along" if name == "along" else name for name in preferences]
+
+
+def _named_along(design: Mesh, given: Follow | None) -> Ints:
+    """Return the edges that seams should follow; errors name the option of strips."""
+    try:
+        return edges_to_follow(design, given)
+    except OptionError as error:
+        raise OptionError(f"seams_{error}") from None
 
 
 def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
@@ -262,9 +308,7 @@ class _Task:
     @property
     def divisible(self) -> bool:
         """Whether pieces are tried where the whole does not hold the limits."""
-        asked = self.request
-        named = asked.options.number is not None or asked.constraints or asked.along is not None
-        return self.division is not None or (asked.max_deviation is not None and not named)
+        return self.division is not None or self.request.may_be_cut
 
     def solved(self) -> Result:
         """Return the whole or the pieces: what holds the limits, or else the closest."""
@@ -294,6 +338,9 @@ class _Task:
             if not self.divisible or any(one.holds for one in tried):
                 return self._answer(tried)
         failed: GSOError | None = None
+        if self.division is None:
+            # Seams of a design that is not symmetric are not symmetric: nothing else will do.
+            asked.seams.searched(light.mesh)
         for division in self._divisions(light):
             try:
                 tried.append(self._in_pieces(light, division()))
@@ -354,6 +401,8 @@ class _Task:
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         best.result.notes += shop_notes(best.result)
+        if best.result.pieces is None and (wanted := self.request.seams.preferences):
+            best.result.notes += (without_seams(_own_names(wanted)),)
         return best.result
 
     def _developable(self) -> list[Tried]:
@@ -390,7 +439,7 @@ class _Task:
 
     def _judged(self, result: StripsResult) -> Tried:
         reasons = judge(result, self.request.limits)
-        return Tried(result, ordered([*reasons, *against_sheet(result, self.request)]))
+        return Tried(result, ordered([*reasons, *against_parts(result, self.request)]))
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request
@@ -423,7 +472,7 @@ class _Task:
         if asked.verdict or self.divisible:
             violation = violation_of(case_of(self.design, asked)) if asked.constraints else 0.0
             own = judge(result, asked.limits, violation)
-            reasons = ordered([*own, *against_sheet(result, asked)])
+            reasons = ordered([*own, *against_parts(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
         return [Tried(result, reasons)]
 
@@ -480,7 +529,7 @@ class _Task:
         families = range(len(lines.choices))
         result = on_sheets(result, asked, [partial(narrow, k) for k in families])
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
-        return [Tried(result, ordered([*own, *against_sheet(result, asked)]))]
+        return [Tried(result, ordered([*own, *against_parts(result, asked)]))]
 
     def _in_pieces(self, light: LightDesign, division: Pieces) -> Tried:
         asked = self.request
@@ -488,7 +537,7 @@ class _Task:
             light = LightDesign(self.design, self.design, asked.max_deviation)
         result, reasons = of_pieces(light, asked, division)
         result = divided(result, asked)
-        return Tried(result, ordered([*reasons, *against_sheet(result, asked)]))
+        return Tried(result, ordered([*reasons, *against_parts(result, asked)]))
 
 
 def _unaligned(lines: LineStrips | None, number: int | None) -> str:

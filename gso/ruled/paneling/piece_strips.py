@@ -223,9 +223,9 @@ def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Se
     MeshError
         A piece cannot be laid flat.
     """
+    mesh = request.seams.searched(light.mesh)
     found = search(
-        # On triangles seams need not follow edge rows.
-        Mesh(light.mesh.vertices, light.mesh.triangles),
+        mesh,
         max_strain=request.max_strain,
         max_deviation=None if light.allowed is None else share * light.allowed,
         darts=False,
@@ -235,6 +235,7 @@ def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Se
         as_it_is=False,
         workers=request.workers,
         callback=request.say,
+        **request.seams.keywords(light.mesh, mesh),
     )
     if any(sheet is None for sheet in found.sheets):
         raise MeshError(f"a piece cannot be laid flat; {'; '.join(map(str, found.reasons))}")

@@ -13,6 +13,7 @@ from gso.geometry.vectors import lengths
 from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.sheet_division import divided_to_fit
+from gso.seams import Sheet
 from gso.status import Status
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare
@@ -27,6 +28,18 @@ def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     if pattern is None or sheet is None:
         return ()
     return _too_large([pattern.flat[part.vertices] for part in split(pattern.mesh)], sheet)
+
+
+def against_parts(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
+    """Return the reasons if parts do not fit the sheet, or do not hold the budgets of pieces."""
+    pattern = result.pattern
+    reasons = against_sheet(result, request)
+    if pattern is None:
+        return reasons
+    parts = split(pattern.surface(result.mesh))
+    sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in parts]
+    pieces = 1 if result.pieces is None else len(result.pieces)
+    return (*reasons, *request.seams.reasons(pieces, sheets))
 
 
 def _too_large(parts: Sequence[Array], sheet: tuple[float, float]) -> tuple[Reason, ...]:

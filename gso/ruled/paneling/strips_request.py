@@ -11,6 +11,7 @@ from gso.constraints import Constraint
 from gso.ruled.paneling.along import Along
 from gso.ruled.paneling.options import Options
 from gso.seams.options import CHANGES
+from gso.seams.seam_request import SeamRequest
 from gso.solver import Callback
 from gso.solver.minimiser import says_no
 from gso.status import Progress
@@ -44,6 +45,8 @@ class StripsRequest:
     start : Start
     along : Along or None
         What strips are to run along.
+    seams : SeamRequest
+        What is asked of the seams of pieces.
     verdict : bool
         Whether to judge the result.
     as_it_is : bool
@@ -63,6 +66,7 @@ class StripsRequest:
     constraints: Sequence[Constraint] = ()
     start: Start = field(default_factory=Start)
     along: Along | None = None
+    seams: SeamRequest = field(default_factory=SeamRequest)
     verdict: bool = True
     as_it_is: bool = True
     workers: int | None = 0
@@ -85,6 +89,12 @@ class StripsRequest:
         return self.callback is None or not says_no(self.callback(progress))
 
     @property
+    def may_be_cut(self) -> bool:
+        """Whether a design may be cut into pieces that are to be found."""
+        named = self.options.number is not None or self.constraints or self.along is not None
+        return self.max_deviation is not None and not named
+
+    @property
     def may_leave_pieces(self) -> bool:
         """Whether pieces that no strips follow may keep the pattern of the joint solve."""
         return self.options.number is None and self.max_deviation is not None
@@ -100,4 +110,5 @@ class StripsRequest:
     @property
     def names_vertices(self) -> bool:
         """Whether it refers to vertices of the design."""
-        return bool(len(self.kept) or self.constraints or self.start.points is not None)
+        named = len(self.kept) or self.constraints or self.seams.preferences
+        return bool(named or self.start.points is not None)
