@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,7 +31,7 @@ from gso.seams.cutting import cut
 from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
 from gso.seams.exact_pieces import exact_pieces
-from gso.seams.kinds import Seam
+from gso.seams.kinds import Edges, Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, prices, too_large
 from gso.seams.reshaping import reshaped
@@ -41,6 +41,7 @@ from gso.seams.straight import straight
 from gso.seams.tree import Ground
 from gso.tasks import check
 from gso.typing import Array, Ints, MeshLike
+from gso.unfolding.manifold import edges_between, manifold_mesh
 from gso.verdict import crosses_itself
 
 #: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
@@ -93,7 +94,9 @@ def pieces(
     ----------
     mesh : Mesh, array_like or path
         The design: closed or with boundary loops, with handles, of one or more components. Quads
-        are cut along edge rows.
+        are cut along edge rows. Where more than two faces share an edge, or parts of the surface
+        share a vertex only, it is divided into sheets, and one-sided surfaces are cut open: the
+        vertices keep their numbers, their copies follow, and a note says how many there are.
     max_strain : float or str, optional
         Largest strain ``|s - 1|`` of every pattern, such as 0.01 or "1%". By default 1 % where
         the shape stays, and 0.1 % where it may change.
@@ -149,7 +152,8 @@ def pieces(
     Raises
     ------
     MeshError
-        The mesh cannot be cut into pieces: it is not orientable, or not manifold.
+        The mesh cannot be read or used: coordinates that are not finite, faces without area, faces
+        that are there twice, vertices on edges of other faces.
     OptionError
         A parameter is wrong.
 
@@ -169,9 +173,11 @@ def pieces(
     adapted.
     """
     clock = time.perf_counter()
-    from gso.io import as_mesh
-
-    design = as_mesh(mesh)
+    design, vertex = manifold_mesh(mesh, sheets=True)
+    said = design.notes
+    if len(np.unique(vertex)) < len(vertex):
+        keep = _of_copies(design, vertex, keep)
+        along = edges_between(design, vertex, along, "along")
 
     def length(value: Length | None, name: str) -> float | None:
         if value is None:
@@ -206,7 +212,19 @@ def pieces(
         except GSOError:
             if out is None:
                 raise
-    return replace(out, seconds=time.perf_counter() - clock)
+    return replace(out, notes=(*said, *out.notes), seconds=time.perf_counter() - clock)
+
+
+def _of_copies(design: Mesh, vertex: Ints, keep: Kept) -> Kept:
+    """Return seams of a surface that was divided, with all copies of their edges."""
+    if isinstance(keep, Edges):
+        return Edges(edges_between(design, vertex, keep.pairs, "keep"))
+    if keep is None or isinstance(keep, Seam | Pieces):
+        return keep
+    given: list[Any] = list(keep)
+    if any(isinstance(one, Seam) for one in given):
+        return [_of_copies(design, vertex, one) for one in given]
+    return edges_between(design, vertex, given, "keep")
 
 
 def _searched(
