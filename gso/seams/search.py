@@ -217,14 +217,16 @@ def pieces(
 
 def _of_copies(design: Mesh, vertex: Ints, keep: Kept) -> Kept:
     """Return seams of a surface that was divided, with all copies of their edges."""
-    if isinstance(keep, Edges):
-        return Edges(edges_between(design, vertex, keep.pairs, "keep"))
-    if keep is None or isinstance(keep, Seam | Pieces):
+    if keep is None or isinstance(keep, Pieces):
         return keep
-    given: list[Any] = list(keep)
-    if any(isinstance(one, Seam) for one in given):
-        return [_of_copies(design, vertex, one) for one in given]
-    return edges_between(design, vertex, given, "keep")
+    seams: Any = keep if isinstance(keep, Iterable) else [keep]
+    seams = list(seams)
+    if not any(isinstance(one, Seam) for one in seams):
+        return edges_between(design, vertex, seams, "keep")
+    return [
+        Edges(edges_between(design, vertex, one.pairs, "keep")) if isinstance(one, Edges) else one
+        for one in seams
+    ]
 
 
 def _searched(

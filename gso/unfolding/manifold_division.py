@@ -158,7 +158,8 @@ def _straight_on(points: Array, triangles: Ints, halves: Ints) -> Ints:
             if group[a] >= 0 and group[b] >= 0:
                 pairs.append((int(halves[group[a]]), int(halves[group[b]])))
                 group[[a, b]] = -1
-    return np.array(pairs, np.int64).reshape(-1, 2).T
+    found: Ints = np.array(pairs, np.int64).reshape(-1, 2).T
+    return found
 
 
 def _around(points: Array, triangles: Ints, halves: Ints, names: Ints | None) -> Ints:
