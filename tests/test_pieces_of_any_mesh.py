@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import gso
 from gso import faults
+from gso.cli import main
 from gso.io import Unwelded
 from gso.mesh import Cut, Mesh
 from gso.seams import Edges, Pieces, turned_at_seams
@@ -160,6 +162,16 @@ class TestPieces:
         with pytest.raises(gso.OptionError, match="along: 0-24 is no edge"):
             gso.pieces((points, faces), along=[[0, 24]])
 
+    def test_of_a_file_at_the_command_line(self, tmp_path):
+        points, faces = with_fin(5)
+        text = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in points]
+        text += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+        (tmp_path / "fin.obj").write_text("\n".join(text))
+        asked = ["pieces", str(tmp_path / "fin.obj"), "-o", str(tmp_path / "cut")]
+        done = CliRunner().invoke(main, [*asked, "--max-strain", "20%"])
+        assert done.exit_code == 0, done.output
+        assert "note: the surface was divided at 5 vertices" in done.output
+
     def test_tiny_components_stay_as_they_are_beside_others(self):
         points, faces = dome(9)
         tiny = np.array([[5.0, 0, 0], [5.1, 0, 0], [5.1, 0.1, 0], [5, 0.1, 0.05]])
@@ -181,6 +193,39 @@ class TestPieces:
                 (both, np.concatenate([faces, faces + len(points)])), workers=0, **given
             )
             assert [r.code for r in found.reasons if r.code is Code.CROSSES_ITSELF]
+
+
+class TestErrors:
+    """What cannot be used is named, with what to do."""
+
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            ("nan", "coordinates of vertex 7 are not finite.*remove or replace"),
+            ("twice", r"face 0 = .* is there 2 times; delete"),
+            ("thin", r"face 32 = .* has no area .*delete it"),
+            ("soup", "weld"),
+            ("corner", "vertex 25 lies on the edge from vertex .* add it to that face"),
+        ],
+    )
+    def test_of_a_mesh(self, change, words):
+        points, faces = dome(5)
+        if change == "nan":
+            points[7] = np.nan
+        elif change == "twice":
+            faces = np.concatenate([faces, faces[:1]])
+        elif change == "thin":
+            points = np.concatenate([points, points[:1] + points[-1:], 2 * points[:1]])
+            faces = np.concatenate([faces, [[0, 25, 26]]])
+            points[25] = 1.5 * points[0]
+        elif change == "soup":
+            points, faces = points[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
+        else:
+            # One face has a vertex on its outer edge that another component shares at its corner.
+            points = np.concatenate([points, 0.5 * (points[:1] + points[1:2]), [[-2, -2, 0]]])
+            faces = np.concatenate([faces, [[25, 1, 26]]])
+        with pytest.raises(gso.MeshError, match=words):
+            gso.pieces((points, faces), max_deviation="2%", workers=0)
 
 
 class TestTurnedAtSeams:
@@ -210,6 +255,17 @@ class TestTurnedAtSeams:
         found = turned_at_seams(result)
         assert set(pieces.of_face[found].tolist()) == set(middle.tolist())
         assert len(found) == 12
+
+    def test_pieces_that_meet_away_from_their_seam_pass_through_each_other(self):
+        pieces, _ = self.strips(np.arange(4.0))
+        points = pieces.design.vertices.copy()
+        # The last strip turns back over the second one, and down through the first.
+        points[:, 2] = np.repeat([0.0, 0.0, 1.0, -1.0], 7)
+        points[:, 0] = np.repeat([0.0, 2.0, 2.0, 0.5], 7)
+        points[14:, 1] += 0.05
+        pairs = faults.crossings(pieces.design.replaced(points))
+        sides = np.unique(np.sort(pieces.of_face[pairs], axis=1), axis=0)
+        assert len(sides) == 1 and sides[0, 0] != sides[0, 1]
 
     def test_a_sharp_edge_between_pieces_is_none(self):
         _, result = self.strips(np.array([0.0, 1.0, 2.0, 3.0]))

@@ -78,7 +78,7 @@ def pieces(
         raise OptionError(f"{folder} is a file; -o names a folder")
     outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json")]
     file_options.spare([name], outputs, force)
-    mesh = file_options.load(name, weld)
+    mesh = file_options.source(name, weld)
     with words() as say:
         found = search(mesh, keep=Groups() if keep_groups else None, callback=say, **given)
     save(found, folder, given["unit"])
