@@ -14,7 +14,6 @@ from gso.cli import main
 from gso.io import Unwelded
 from gso.mesh import Cut, Mesh
 from gso.seams import Edges, Pieces, turned_at_seams
-from gso.status import Status
 from gso.unfolding import manifold_mesh
 from gso.verdict import Code
 
@@ -244,7 +243,13 @@ class TestTurnedAtSeams:
         moved = opened.mesh.replaced(after[opened.vertex])
         solved = Pieces(design.replaced(after), Cut(moved, opened.vertex, opened.seams))
         return pieces, gso.Result(
-            "developable", "curvature", opened.mesh, moved, None, Status.CONVERGED, pieces=solved
+            "developable",
+            "curvature",
+            opened.mesh,
+            moved,
+            None,
+            gso.Status.CONVERGED,
+            pieces=solved,
         )
 
     def test_a_piece_between_two_others_on_its_back_is_found(self):

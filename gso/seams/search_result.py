@@ -135,7 +135,7 @@ def turned_at_seams(result: Result) -> Ints:
     before, after = (
         quad_area_vectors(mesh.vertices, corners) for mesh in (result.design, result.mesh)
     )
-    return folds[np.einsum("fd,fd->f", before, after) < 0.0]
+    return np.asarray(folds[np.einsum("fd,fd->f", before, after) < 0.0])
 
 
 def _of_sheets(found: Candidate) -> dict[Code, Measurement]:
