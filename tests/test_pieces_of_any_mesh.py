@@ -227,6 +227,20 @@ class TestErrors:
             gso.pieces((points, faces), max_deviation="2%", workers=0)
 
 
+def test_stars_that_pass_through_themselves_are_found():
+    """A star of triangles that winds around its vertex more than once, and one that does not."""
+    for turns, crossed in ((1.0, False), (2.0, True)):
+        angle = np.arange(12) * 2 * np.pi * turns / 12 + 0.05
+        height = 0.4 * np.cos(angle / turns)
+        rim = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
+        mesh = Mesh(
+            np.concatenate([rim, np.zeros((1, 3))]),
+            [[12, k, (k + 1) % 12] for k in range(12)],
+        )
+        assert bool(len(faults.crossings_at_vertices(mesh))) is crossed
+        assert not len(faults.crossings(mesh))
+
+
 class TestTurnedAtSeams:
     def strips(self, x: np.ndarray):
         """A flat sheet in three strips, and the result in which its columns are at x."""

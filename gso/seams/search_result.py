@@ -79,6 +79,9 @@ def packed(
         over = np.empty(0, np.int64) if result.pieces is None else turned_at_seams(result)
         if len(over) and not faulty[Code.FOLDED].value:
             faulty[Code.FOLDED] = Measurement.count("face", over)
+        if own.design.is_triangles and not faulty[Code.CROSSES_ITSELF].value:
+            met = np.unique(faults.crossings_at_vertices(own.design))
+            faulty[Code.CROSSES_ITSELF] = Measurement.count("face", met)
         measured |= faulty
         away = metrics.surface_distance(given, own.design)
         numbers["deviation_mean"] = away.mean
