@@ -175,7 +175,11 @@ def pieces(
     clock = time.perf_counter()
     design, vertex = manifold_mesh(mesh, sheets=True)
     said = design.notes
-    if len(np.unique(vertex)) < len(vertex):
+    copies = len(vertex) - len(np.unique(vertex))
+    if len(design.faces) > copies:
+        # Otherwise it is the division that has taken most faces apart.
+        design.check_joined()
+    if copies:
         keep = _of_copies(design, vertex, keep)
         along = edges_between(design, vertex, along, "along")
 
@@ -261,7 +265,6 @@ def _searched(
 
 def _read(design: Mesh, keep: Kept, denoise: bool) -> tuple[Mesh, Ints]:
     """Return the design to cut, and the edges of it (k, 2) that are cut in any case."""
-    design.check_joined()
     kept = np.empty((0, 2), np.int64)
     if isinstance(keep, Pieces):
         design, kept = _again(design, keep), keep.edges
