@@ -14,7 +14,7 @@ class MeshError(GSOError, ValueError):
 
 
 class NonManifoldError(MeshError):
-    """Parts of a surface share a vertex only, or an edge has more than two faces."""
+    """Parts share only a vertex, an edge has more than two faces, or the surface is one-sided."""
 
 
 class OptionError(GSOError, ValueError):

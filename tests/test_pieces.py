@@ -318,7 +318,7 @@ def test_noise_is_named():
     assert any("denoise" in note for note in found.notes)
 
 
-def test_what_is_no_surface_is_refused():
+def test_what_is_not_manifold_or_one_sided_is_divided():
     turn = np.linspace(0, 2 * np.pi, 13)[:-1]
     ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     side = 0.3 * np.stack(
@@ -327,11 +327,11 @@ def test_what_is_no_surface_is_refused():
     k = np.arange(12)
     strip = np.stack([k, (k + 1) % 12, (k + 1) % 12 + 12, k + 12], axis=1)
     strip[-1] = [11, 12, 0, 23]
-    with pytest.raises(gso.MeshError, match="orient"):
-        gso.pieces((np.concatenate([ring - side, ring + side]), strip), darts=True)
+    found = gso.pieces((np.concatenate([ring - side, ring + side]), strip), darts=True)
+    assert all(piece.is_disk for piece in found) and "one-sided" in found.notes[0]
     fins = [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
-    with pytest.raises(gso.MeshError, match="0"):
-        gso.pieces((np.random.default_rng(0).random((5, 3)), fins))
+    found = gso.pieces((np.random.default_rng(0).random((5, 3)), fins))
+    assert "0-1" in found.notes[0] and len(found) in (2, 3)
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,16 @@
 Each function returns faces or edges in the numbering of the mesh; an empty array means none.
 """
 
-from gso.faults.crossings import crossings
+from gso.faults.crossings import crossings, crossings_at_vertices
 from gso.faults.folds import SHORT, collapsed, folded
 from gso.faults.overlaps import overlapping, overlaps
 
-__all__ = ["SHORT", "collapsed", "crossings", "folded", "overlapping", "overlaps"]
+__all__ = [
+    "SHORT",
+    "collapsed",
+    "crossings",
+    "crossings_at_vertices",
+    "folded",
+    "overlapping",
+    "overlaps",
+]

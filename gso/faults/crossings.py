@@ -59,6 +59,44 @@ def crossings(mesh: Mesh) -> Ints:
     return found[np.lexsort(found.T[::-1])]
 
 
+def crossings_at_vertices(mesh: Mesh) -> Ints:
+    """Find the pairs of triangles that share one vertex and pass through each other beside it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of triangles.
+
+    Returns
+    -------
+    ndarray of int, (p, 2)
+        Faces, the smaller number first; in increasing order, none twice.
+
+    Examples
+    --------
+    >>> points = [[0, 0, 0], [2, -1, 0], [2, 1, 0], [2, 0, -1], [2, 0, 1], [3, 9, 0]]
+    >>> fan = [[0, 1, 2], [0, 2, 5], [0, 5, 4], [0, 4, 3]]
+    >>> crossings_at_vertices(Mesh(points, fan))
+    array([[0, 3]])
+    """
+    faces, count = mesh.faces, len(mesh.vertices)
+    order = np.argsort(faces.ravel(), kind="stable")
+    degree = np.bincount(faces.ravel(), minlength=count)
+    first = np.cumsum(degree) - degree
+    found = [np.empty((0, 2), np.int64)]
+    for number in np.unique(degree[degree > 2]).tolist():
+        star = order[first[degree == number][:, None] + np.arange(number)] // 3
+        one, two = np.triu_indices(number, 1)
+        found.append(np.stack([star[:, one].ravel(), star[:, two].ravel()], axis=1))
+    pairs = np.concatenate(found)
+    a, b = (faces[pairs[:, side]] for side in (0, 1))
+    pairs = pairs[(a[:, :, None] == b[:, None, :]).sum(axis=(1, 2)) == 1]
+    corner = mesh.vertices[faces]
+    width = np.ptp(corner, axis=1).max(axis=1)[pairs].min(axis=1)
+    crossed = _cross(corner[pairs[:, 0]], corner[pairs[:, 1]], DEPTH * width)
+    return np.unique(np.sort(pairs[crossed], axis=1), axis=0)
+
+
 def _is_graph(mesh: Mesh, points: Array, triangles: Ints) -> bool:
     """Tell whether the surface certainly lies over a plane without covering a point twice."""
     axis = upright(geometry.area_vectors(points, triangles))

@@ -32,7 +32,7 @@ from gso.io.cad import (
     save_solids,
     save_spline,
 )
-from gso.io.convert import as_mesh
+from gso.io.convert import as_mesh, as_surface
 from gso.io.flat_svg import save_flat
 from gso.io.lines import save_lines
 from gso.io.raw_surface import Surface, welded
@@ -50,6 +50,7 @@ __all__ = [
     "Unwelded",
     "add_format",
     "as_mesh",
+    "as_surface",
     "check_package",
     "check_spline",
     "check_writable",
@@ -148,15 +149,21 @@ def load(path: AnyPath, *, weld: float | None = None, chord: float | None = None
     return _read(path, lambda surface: surface.mesh(weld), chord)
 
 
-def read_surface(path: AnyPath) -> Surface:
-    """Read the vertices and faces of a mesh file without checking that they are a surface.
+def read_surface(path: AnyPath, *, chord: float | None = None) -> Surface:
+    """Read the vertices and faces of a file without checking that they are a surface.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    chord : float, optional
+        As for :func:`load`.
 
     Raises
     ------
     MeshError
         The file is missing, of an unknown format or damaged.
     """
-    return _read(path, lambda surface: surface)
+    return _read(path, lambda surface: surface, chord)
 
 
 def polylines(path: AnyPath) -> list[Array]:

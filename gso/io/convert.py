@@ -54,21 +54,52 @@ def as_mesh(x: MeshLike, *, weld: float | None = None) -> Mesh:
         from gso.io import load
 
         return load(os.fsdecode(x), weld=weld)
+    return as_surface(x).mesh(weld)
+
+
+def as_surface(x: MeshLike) -> Surface:
+    """Return the vertices and faces of what :func:`as_mesh` takes, without checking them.
+
+    Raises
+    ------
+    MeshError
+        `x` is no surface, or a file that cannot be read.
+
+    Examples
+    --------
+    >>> as_surface(([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]])).faces
+    [[0, 1, 2]]
+    """
+    if isinstance(x, Unwelded):
+        given: Any = x.surface
+        if isinstance(given, (str, bytes, os.PathLike)):
+            from gso.io import read_surface
+
+            surface = read_surface(os.fsdecode(given), chord=x.chord)
+        else:
+            surface = as_surface(given)
+        return surface if x.weld is None else surface.welded(x.weld)
+    if isinstance(x, Mesh):
+        return Surface(x.vertices, x.faces, x.given_notes, x.attributes)
+    if isinstance(x, (str, bytes, os.PathLike)):
+        from gso.io import read_surface
+
+        return read_surface(os.fsdecode(x))
     # If x is a Trimesh, trimesh has been imported already.
     trimesh = sys.modules.get("trimesh")
     if trimesh is not None and isinstance(x, trimesh.Trimesh):
-        return Surface(x.vertices, x.faces).mesh(weld)
+        return Surface(x.vertices, x.faces)
     if trimesh is not None and isinstance(x, trimesh.Scene):
         raise MeshError("a trimesh.Scene is no single mesh; give scene.to_mesh()")
     if isinstance(x, (tuple, list)) and len(x) == 2:
-        return Surface(*x).mesh(weld)
+        return Surface(*x)
     try:
-        given: Any = x
-        points = np.asarray(given)
+        values: Any = x
+        points = np.asarray(values)
     except (TypeError, ValueError):
         points = np.empty(0, object)
     if points.ndim == 3 and points.shape[2] == 3 and points.dtype.kind in "iuf":
-        return Surface(points, None).mesh(weld)
+        return Surface(points, None)
     what = f"an array {points.shape}" if points.dtype.kind in "iuf" else f"{type(x).__name__}"
     raise MeshError(
         f"{what} is no surface: give a Mesh, an array (H, W, 3), a pair (vertices, faces), a "

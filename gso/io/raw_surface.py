@@ -46,11 +46,17 @@ class Surface:
             grid = Mesh.from_grid(self.vertices)
             return grid if weld is None else welded(grid, weld)
         if weld is not None:
-            return _welded(self, self.faces, checked(weld)).mesh()
+            return self.welded(weld).mesh()
         mesh = self._made(self.faces)
         if mesh.is_triangles or mesh.grid_index is not None:
             return mesh
         return self._convex(mesh, checked_table(self.faces, len(mesh.vertices)))
+
+    def welded(self, weld: float) -> Surface:
+        """Merge vertices within a distance, as :func:`welded` does; a grid stays as it is."""
+        if self.faces is None:
+            return self
+        return _welded(self, self.faces, checked(weld))
 
     def _made(self, faces: ArrayLike) -> Mesh:
         try:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gso.seams.disks import opening
     from gso.seams.regions import Regions
     from gso.seams.search import pieces
+    from gso.seams.search_result import turned_at_seams
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
 
@@ -43,6 +44,7 @@ __all__ = [
     "opening",
     "pieces",
     "rectangle",
+    "turned_at_seams",
 ]
 
 # These import SciPy.
@@ -53,6 +55,7 @@ __getattr__, __dir__ = at_first_use(
         "disks": "opening",
         "regions": "Regions",
         "search": "pieces",
+        "search_result": "turned_at_seams",
         "segmentation": "Segmentation",
         "sheets": "Sheet",
     },

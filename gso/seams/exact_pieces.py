@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.cut_pieces import Pieces
-from gso.errors import OptionError
+from gso.errors import MeshError, OptionError
 from gso.exact import folded_pattern
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
@@ -30,8 +30,8 @@ def exact_pieces(design: Mesh, kept: Ints, settings: PieceSettings) -> Candidate
         found = folded_pattern(
             design, max_strain=settings.max_strain, cut=kept, sheet=settings.max_size
         )
-    except OptionError:
-        # A face is larger than the sheet.
+    except (MeshError, OptionError):
+        # Facets of round faces do not fit together, or a face is larger than the sheet.
         return None
     if found is None:
         return None

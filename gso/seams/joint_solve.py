@@ -11,7 +11,7 @@ import numpy as np
 
 from gso.constraints import Constraint, Glue, SmoothCurves
 from gso.cut_pieces import Pieces
-from gso.errors import OptionError
+from gso.errors import MeshError, OptionError
 from gso.mesh import Cut, Mesh
 from gso.pipeline import add_verdict
 from gso.pipeline.component_solves import solve_mesh
@@ -80,6 +80,11 @@ def solve_pieces(
     -------
     Result
         Its design and mesh are cut open; `pieces` has the result's.
+
+    Raises
+    ------
+    MeshError
+        No vertex is inside a piece. Where only some components have none, these stay as they are.
     """
     if request.task not in ("developable", "flatten"):
         raise OptionError(
@@ -108,6 +113,8 @@ def _solve(
 ) -> Result:
     """Solve pieces, which are close to the design by the weights of the energy only."""
     design = pieces.opened.mesh
+    if request.task == "developable" and not design.stars:
+        raise MeshError("no vertex is inside a piece, so no piece has curvature; refine the mesh")
     wanted = list(constraints)
     if request.task == "developable":
         wanted = [*constraints_of(pieces), *of_design(constraints, pieces.design)]

@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,7 +32,7 @@ from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
 from gso.seams.edge_prices import Avoid, Follow, prices
 from gso.seams.exact_pieces import exact_pieces
-from gso.seams.kinds import Seam
+from gso.seams.kinds import Edges, Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, too_large
 from gso.seams.reshaping import at_scale, reshaped
@@ -43,6 +43,7 @@ from gso.seams.symmetry import plane_of
 from gso.seams.tree import Ground
 from gso.tasks import check
 from gso.typing import Array, Ints, MeshLike
+from gso.unfolding.manifold import edges_between, manifold_mesh
 from gso.verdict import crosses_itself
 
 #: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
@@ -95,7 +96,9 @@ def pieces(
     ----------
     mesh : Mesh, array_like or path
         The design: closed or with boundary loops, with handles, of one or more components. Quads
-        are cut along edge rows.
+        are cut along edge rows. Where more than two faces share an edge, or parts of the surface
+        share a vertex only, it is divided into sheets, and one-sided surfaces are cut open: the
+        vertices keep their numbers, their copies follow, and a note says how many there are.
     max_strain : float or str, optional
         Largest strain ``|s - 1|`` of every pattern, such as 0.01 or "1%". By default 1 % where
         the shape stays, and 0.1 % where it may change.
@@ -155,7 +158,8 @@ def pieces(
     Raises
     ------
     MeshError
-        The mesh cannot be cut into pieces: it is not orientable, or not manifold.
+        The mesh cannot be read or used: coordinates that are not finite, faces without area, faces
+        that are there twice, vertices on edges of other faces.
     OptionError
         A parameter is wrong.
 
@@ -175,9 +179,15 @@ def pieces(
     adapted.
     """
     clock = time.perf_counter()
-    from gso.io import as_mesh
-
-    design = as_mesh(mesh)
+    design, vertex = manifold_mesh(mesh, sheets=True)
+    said = design.notes
+    copies = len(vertex) - len(np.unique(vertex))
+    if len(design.faces) > copies:
+        # Otherwise it is the division that has taken most faces apart.
+        design.check_joined()
+    if copies:
+        keep = _of_copies(design, vertex, keep)
+        along = edges_between(design, vertex, along, "along")
 
     def length(value: Length | None, name: str) -> float | None:
         if value is None:
@@ -212,7 +222,21 @@ def pieces(
         except GSOError:
             if out is None:
                 raise
-    return replace(out, seconds=time.perf_counter() - clock)
+    return replace(out, notes=(*said, *out.notes), seconds=time.perf_counter() - clock)
+
+
+def _of_copies(design: Mesh, vertex: Ints, keep: Kept) -> Kept:
+    """Return seams of a surface that was divided, with all copies of their edges."""
+    if keep is None or isinstance(keep, Pieces):
+        return keep
+    seams: Any = keep if isinstance(keep, Iterable) else [keep]
+    seams = list(seams)
+    if not any(isinstance(one, Seam) for one in seams):
+        return edges_between(design, vertex, seams, "keep")
+    return [
+        Edges(edges_between(design, vertex, one.pairs, "keep")) if isinstance(one, Edges) else one
+        for one in seams
+    ]
 
 
 def _searched(
@@ -249,7 +273,6 @@ def _searched(
 
 def _read(design: Mesh, keep: Kept, denoise: bool) -> tuple[Mesh, Ints]:
     """Return the design to cut, and the edges of it (k, 2) that are cut in any case."""
-    design.check_joined()
     kept = np.empty((0, 2), np.int64)
     if isinstance(keep, Pieces):
         design, kept = _again(design, keep), keep.edges

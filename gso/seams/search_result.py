@@ -8,9 +8,10 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
-from gso.geometry import chain_turns
+from gso.geometry import chain_turns, quad_area_vectors
 from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
+from gso.mesh.topology import four_corners
 from gso.result import Result
 from gso.seams.candidates import Candidate
 from gso.seams.facets import FACETS, mean_angle
@@ -74,7 +75,14 @@ def packed(
             numbers |= {"deviation_mean": 0.0, "deviation_max": 0.0}
     else:
         # Both sides of a seam touch, which is no crossing where they are sewn.
-        measured |= of_surface(result.design, result.mesh) | crossed(own.design)
+        faulty = of_surface(result.design, result.mesh) | crossed(own.design)
+        over = np.empty(0, np.int64) if result.pieces is None else turned_at_seams(result)
+        if len(over) and not faulty[Code.FOLDED].value:
+            faulty[Code.FOLDED] = Measurement.count("face", over)
+        if own.design.is_triangles and not faulty[Code.CROSSES_ITSELF].value:
+            met = np.unique(faults.crossings_at_vertices(own.design))
+            faulty[Code.CROSSES_ITSELF] = Measurement.count("face", met)
+        measured |= faulty
         away = metrics.surface_distance(given, own.design)
         numbers["deviation_mean"] = away.mean
         numbers["deviation_max"] = away.largest
@@ -111,6 +119,26 @@ def packed(
         given,
         kept,
     )
+
+
+def turned_at_seams(result: Result) -> Ints:
+    """Return the faces that have turned over, and at a seam lie on the neighbouring piece.
+
+    A sharp edge between two pieces alone is no fold, such as the rim of a thin shell.
+
+    Parameters
+    ----------
+    result : Result
+        A joint solve with its pieces.
+    """
+    if result.pieces is None:
+        raise ValueError("a result without pieces has no seams")
+    folds = np.setdiff1d(faults.folded(result.pieces.design), faults.folded(result.mesh))
+    corners = four_corners(result.mesh.faces[folds])
+    before, after = (
+        quad_area_vectors(mesh.vertices, corners) for mesh in (result.design, result.mesh)
+    )
+    return np.asarray(folds[np.einsum("fd,fd->f", before, after) < 0.0])
 
 
 def _of_sheets(found: Candidate) -> dict[Code, Measurement]:

@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
+    from gso.unfolding.manifold import manifold_mesh
     from gso.unfolding.patch_joining import Joined, join_patches
     from gso.unfolding.planar_faces import PlanarFaces
     from gso.unfolding.polyhedral_net import Net
     from gso.unfolding.unfold_mesh import net_of, unfold
 
-__all__ = ["Joined", "Net", "PlanarFaces", "join_patches", "net_of", "unfold"]
+__all__ = ["Joined", "Net", "PlanarFaces", "join_patches", "manifold_mesh", "net_of", "unfold"]
 
 # These import SciPy.
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
+        "manifold": "manifold_mesh",
         "patch_joining": "Joined join_patches",
         "planar_faces": "PlanarFaces",
         "polyhedral_net": "Net",

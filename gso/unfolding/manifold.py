@@ -1,4 +1,4 @@
-"""Division of surfaces where they are not manifold, and faces inside bodies."""
+"""Meshes of surfaces that are not manifold, and edges of them by given vertices."""
 
 from __future__ import annotations
 
@@ -9,22 +9,27 @@ from numpy.typing import ArrayLike
 
 from gso import io
 from gso.errors import MeshError, NonManifoldError, OptionError
-from gso.geometry.vectors import unit
 from gso.io.raw_surface import Surface
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys, label_components, pair_keys
+from gso.mesh.topology import pair_keys
 from gso.mesh.validation import checked_table, checked_vertices
-from gso.typing import Array, Flags, Ints, MeshLike
-
-#: Volume, relative to the cube of the size, from which on a region of space is closed.
-_CLOSED = 1e-9
+from gso.typing import Ints, MeshLike
+from gso.unfolding.manifold_division import divided
 
 
-def manifold_mesh(given: MeshLike) -> tuple[Mesh, Ints]:
+def manifold_mesh(given: MeshLike, *, sheets: bool = False) -> tuple[Mesh, Ints]:
     """Make a mesh as :func:`gso.as_mesh`; a surface that is not manifold is divided, with a note.
 
     Bodies that touch at a vertex or an edge become components; so does a fin at a body's edge.
     Vertices keep their numbers, and copies of them follow.
+
+    Parameters
+    ----------
+    given : MeshLike
+    sheets : bool
+        Whether the surface is one of sheets rather than of bodies. Then faces inside bodies become
+        sheets of their own, sheets that go on nearly straight across an edge of more than two
+        faces stay joined there, and one-sided surfaces are cut.
 
     Returns
     -------
@@ -35,21 +40,24 @@ def manifold_mesh(given: MeshLike) -> tuple[Mesh, Ints]:
     Raises
     ------
     MeshError
-        The surface cannot be read or used, or a body has faces inside.
+        The surface cannot be read or used, or a body has faces inside and `sheets` is not set.
     """
     try:
         mesh = io.as_mesh(given)
         return mesh, np.arange(len(mesh.vertices))
-    except NonManifoldError:
-        if isinstance(given, tuple | list) and len(given) == 2:
-            return _of_surface(Surface(*given))
-        if not isinstance(given, str | bytes | os.PathLike):
-            raise
-    path = os.fsdecode(given)
+    except NonManifoldError as error:
+        refused = error
+    surface = io.as_surface(given)
     try:
-        return _of_surface(io.read_surface(path))
+        found = _of_surface(surface, sheets)
     except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
+        source = given.surface if isinstance(given, io.Unwelded) else given
+        if not isinstance(source, str | bytes | os.PathLike):
+            raise
+        raise MeshError(f"{os.fsdecode(source)}: {error}") from None
+    if found is None:
+        raise refused
+    return found
 
 
 def edges_between(mesh: Mesh, vertex: Ints, pairs: ArrayLike | None, name: str) -> Ints:
@@ -85,7 +93,10 @@ def edges_between(mesh: Mesh, vertex: Ints, pairs: ArrayLike | None, name: str) 
     return np.asarray(mesh.edges[np.isin(keys, wanted)])
 
 
-def _of_surface(surface: Surface) -> tuple[Mesh, Ints]:
+def _of_surface(surface: Surface, sheets: bool) -> tuple[Mesh, Ints] | None:
+    """Divide an unchecked surface; None where that does not make it manifold."""
+    if surface.faces is None:
+        return None
     points = checked_vertices(surface.vertices)
     table = checked_table(np.asarray(surface.faces), len(points))
     split = table[:, :3], table[:, [0, 2, -1]][(table.shape[1] == 4) & (table[:, -1] >= 0)]
@@ -93,9 +104,9 @@ def _of_surface(surface: Surface) -> tuple[Mesh, Ints]:
     triangles = np.concatenate(split if table.shape[1] == 4 else split[:1])
     owner = owner[: len(triangles)]
     names = owner if surface.polygon is None else surface.polygon[owner]
-    found = divided(points, triangles, names)
+    found = divided(points, triangles, names, sheets)
     if found is None:
-        raise MeshError("the surface is not manifold, and cannot be divided")
+        return None
     number, vertex, note = found
     # The triangles of a face hang together, so that its corners have one number each.
     new = table.copy()
@@ -106,116 +117,3 @@ def _of_surface(surface: Surface) -> tuple[Mesh, Ints]:
     notes = (*surface.notes, note)
     made = Mesh(points[vertex], new, notes=notes, attributes=surface.attributes, touching=True)
     return made, vertex
-
-
-def divided(points: Array, triangles: Ints, names: Ints) -> tuple[Ints, Ints, str] | None:
-    """Divide triangles (t, 3) where they are not manifold.
-
-    Around an edge of more than two, those that bound the same body stay joined.
-
-    Parameters
-    ----------
-    points : ndarray, (n, 3)
-    triangles : ndarray of int, (t, 3)
-    names : ndarray of int, (t,)
-        The given face of each triangle.
-
-    Returns
-    -------
-    (ndarray of int (t, 3), ndarray of int (m,), str) or None
-        The triangles, the given vertex of each vertex, and a note; None if they are manifold.
-
-    Raises
-    ------
-    MeshError
-        A body has faces inside.
-    """
-    count = len(points)
-    origin, dest = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    key = edge_keys(origin, dest, count)
-    order = np.argsort(key, kind="stable")
-    _, start, often = np.unique(key[order], return_index=True, return_counts=True)
-    pair = start[often == 2]
-    one, other = order[pair], order[pair + 1]
-    crowded = often > 2
-    if crowded.any():
-        more = _around(points, triangles, order[np.repeat(crowded, often)], names)
-        one, other = np.r_[one, more[0]], np.r_[other, more[1]]
-    # The corners at both ends of an edge with two faces are joined.
-    ahead = np.arange(len(origin)) // 3 * 3 + (np.arange(len(origin)) + 1) % 3
-    same = origin[one] == origin[other]
-    a = np.r_[one, ahead[one]]
-    b = np.r_[np.where(same, other, ahead[other]), np.where(same, ahead[other], other)]
-    fan = label_components(len(origin), a, b)
-    _, corner = np.unique(fan, return_index=True)
-    owner = origin[corner]
-    if len(owner) == len(np.unique(origin)):
-        return None
-    rank = np.argsort(owner, kind="stable")
-    fresh = np.r_[True, owner[rank][1:] != owner[rank][:-1]]
-    # The first fan of a vertex keeps its number.
-    number = owner.copy()
-    number[rank[~fresh]] = count + np.arange(int((~fresh).sum()))
-    vertex = np.r_[np.arange(count), owner[rank[~fresh]]]
-    at = int(owner[rank[~fresh]][0])
-    note = (
-        f"the surface was divided at {len(np.unique(owner[rank[~fresh]]))} vertices where its "
-        f"parts share no edge with two faces (the first is vertex {at})"
-    )
-    if crowded.any():
-        edge = int(order[start[crowded][0]])
-        note += (
-            f"; {int(crowded.sum())} edges have more than two faces (the first is "
-            f"{origin[edge]}-{dest[edge]})"
-        )
-    return number[fan].reshape(triangles.shape), vertex, note
-
-
-def _around(points: Array, triangles: Ints, halves: Ints, names: Ints) -> tuple[Ints, Ints]:
-    """Pair the half-edges at edges of more than two triangles that bound the same body.
-
-    Both sides of each triangle belong to regions of space: around an edge, the sides that face
-    each other belong to one. Closed regions have a volume above zero, and the space outside of
-    them one below zero.
-
-    Raises
-    ------
-    MeshError
-        On both sides of some triangle there are different closed regions.
-    """
-    count, t = len(points), len(triangles)
-    p = points[triangles]
-    origin, dest = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    key = edge_keys(origin, dest, count)
-    forward = origin < dest
-    way = unit(np.where(forward, 1.0, -1.0)[:, None] * (points[dest] - points[origin]))
-    inward = p[:, [2, 0, 1]].reshape(-1, 3) - points[origin]
-    least = np.eye(3)[np.abs(way).argmin(axis=1)]
-    x = unit(np.cross(least, way))
-    angle = np.arctan2((np.cross(way, x) * inward).sum(axis=1), (x * inward).sum(axis=1))
-    order = np.lexsort((angle, key))
-    last = np.flatnonzero(np.diff(key[order], append=-1) != 0)
-    first = np.r_[0, last[:-1] + 1]
-    after = np.r_[order[1:], order[:1]]
-    after[last] = order[first]
-    # Anticlockwise about the edge is the front of a triangle that runs along it.
-    triangle = order // 3
-    left = triangle + t * ~forward[order]
-    right = after // 3 + t * forward[after]
-    region = label_components(2 * t, left, right)
-    middle = points - points[np.unique(triangles)].mean(axis=0)
-    q = middle[triangles]
-    volume = np.einsum("td,td->t", q[:, 0], np.cross(q[:, 1], q[:, 2])) / 6.0
-    size = np.bincount(region, np.r_[-volume, volume])
-    closed: Flags = size > _CLOSED * float(np.ptp(points[origin], axis=0).max()) ** 3
-    front, back = region[:t], region[t:]
-    inner = np.flatnonzero(closed[front] & closed[back] & (front != back))
-    if len(inner):
-        some = np.unique(names[inner])
-        place = ", ".join(f"{x:.6g}" for x in p[inner[0]].mean(axis=0))
-        raise MeshError(
-            f"face {some[0]} at ({place}) is inside a body, with parts of it on both sides "
-            f"({len(some)} such faces); delete them, or separate the bodies"
-        )
-    solid = closed[region[left]] & np.isin(order, halves)
-    return order[solid], after[solid]

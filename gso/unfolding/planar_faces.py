@@ -13,7 +13,7 @@ from gso.geometry.ears import ears, in_plane
 from gso.geometry.vectors import unit
 from gso.mesh import Mesh
 from gso.typing import Array, Ints
-from gso.unfolding.manifold import divided
+from gso.unfolding.manifold_division import divided
 
 #: Distance of the corners of a face from its plane, relative to its size, that a note names.
 _BENT = 1e-4

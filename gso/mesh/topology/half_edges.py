@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gso.errors import MeshError, NonManifoldError
+from gso.errors import NonManifoldError
 from gso.mesh.topology.graph import edge_graph, label_components
 from gso.typing import Flags, Ints
 
@@ -129,7 +129,7 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
 
     Raises
     ------
-    MeshError
+    NonManifoldError
         An edge has three faces or more, or the surface is not orientable.
     """
     origin, dest, face, _ = _half_edge_table(faces)
@@ -152,7 +152,7 @@ def orient(faces: Ints, vertex_count: int) -> tuple[Ints, int, int]:
     wrong = (flip[face[h]] ^ flip[face[g]]) != odd
     if wrong.any():
         at = h[wrong][0]
-        raise MeshError(
+        raise NonManifoldError(
             f"the surface is one-sided (a Moebius strip): no orientation fits at edge "
             f"{origin[at]}-{dest[at]}; cut it open first"
         )
@@ -183,7 +183,7 @@ def check_vertices(he: HalfEdges) -> None:
 
     Raises
     ------
-    MeshError
+    NonManifoldError
         There is such a vertex; the message names the first one.
     """
     count = he.origin.size

@@ -79,7 +79,8 @@ class Options(BaseOptions):
         vertices than this, or than four times as many under constraints.
     by_component : bool
         Weigh each of several components that constraints join for its own size and curvature;
-        otherwise for those of the whole mesh, as for the pieces of one design.
+        otherwise for those of the whole mesh, as for the pieces of one design. Components without
+        interior vertices then stay as they are.
     developable_below : float
         A design whose mean |K| is below this is developable already and is returned unchanged,
         unless there are constraints, `x0` or variables "surface".

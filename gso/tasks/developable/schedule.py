@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from gso import metrics as measure
-from gso.constraints import Compiled
+from gso.constraints import TIGHT, Compiled
 from gso.energy.losses import Absolute
 from gso.errors import MeshError
 from gso.mesh import Mesh
@@ -56,7 +56,9 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
     notes: list[str] = []
     check_handles(analysis, request)
     if not mesh.stars:
-        raise _nothing_inside(mesh)
+        if options.by_component or _missed(analysis):
+            raise _nothing_inside(mesh)
+        return Plan(_layout(mesh), mesh.vertices.ravel(), status=Status.ALREADY_GOOD)
     start = mesh.vertices if request.x0 is None else request.x0
     curved = analysis.shape.curvature
     spline = spline_stage.controls(analysis, request)
@@ -113,6 +115,12 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
         cold_start=None if request.x0 is None else mesh.vertices.ravel,
         edited=edited,
     )
+
+
+def _missed(analysis: Analysis) -> bool:
+    """Tell whether the design misses a hard constraint."""
+    misses = analysis.constraints.violations(analysis.mesh.vertices).values()
+    return any(miss.hard and miss.length > TIGHT for miss in misses)
 
 
 def _nothing_inside(mesh: Mesh) -> MeshError:
