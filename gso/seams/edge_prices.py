@@ -46,6 +46,12 @@ def prices(mesh: Mesh, along: Follow | None, avoid: Avoid | None) -> Array | Non
     return factor
 
 
+def pairs_of(along: Follow | None) -> Array | None:
+    """Return what seams should follow if it is edges, pairs of vertices; None if it is not."""
+    whole = _array(along)
+    return whole if whole is not None and whole.ndim == 2 and whole.shape[1] == 2 else None
+
+
 def edges_to_follow(mesh: Mesh, along: Follow | None) -> Ints:
     """Return the edges (k, 2) of a mesh that seams should follow.
 
@@ -72,8 +78,9 @@ def edges_to_follow(mesh: Mesh, along: Follow | None) -> Ints:
     whole = _array(along)
     if along is None or (whole is not None and whole.size == 0):
         return none
-    if whole is not None and whole.ndim == 2 and whole.shape[1] == 2:
-        return _edges(mesh, whole)
+    pairs = pairs_of(along)
+    if pairs is not None:
+        return _edges(mesh, pairs)
     found = [none]
     for number, one in enumerate(_lines(along, whole, "along", "edges as pairs of vertices"), 1):
         seam = one if isinstance(one, Seam) else Polyline(one)

@@ -30,7 +30,7 @@ from gso.seams.candidates import (
 from gso.seams.cutting import cut
 from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise
-from gso.seams.edge_prices import Avoid, Follow, prices
+from gso.seams.edge_prices import Avoid, Follow, pairs_of, prices
 from gso.seams.exact_pieces import exact_pieces
 from gso.seams.kinds import Edges, Seam
 from gso.seams.mirror_plane import mirror_of
@@ -187,7 +187,8 @@ def pieces(
         design.check_joined()
     if copies:
         keep = _of_copies(design, vertex, keep)
-        along = edges_between(design, vertex, along, "along")
+        if (pairs := pairs_of(along)) is not None:
+            along = edges_between(design, vertex, pairs, "along")
 
     def length(value: Length | None, name: str) -> float | None:
         if value is None:
