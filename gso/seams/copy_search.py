@@ -247,7 +247,12 @@ class CopySearch:
         """Cut between regions, along kept edges, to the apexes of cones, and until all is disks."""
         mesh, edges = divided.mesh, edges_between(divided.mesh, divided.label)
         edges = np.concatenate([edges, divided.lines(kept)])
-        ground = Ground.of(mesh)
+        factor = None
+        if self.plane is not None:
+            # Cuts without a mirror image run in the plane of symmetry.
+            away = np.abs(self.plane.height(mesh.vertices[mesh.edges].mean(axis=1)))
+            factor = 1.0 + away / self.width
+        ground = Ground.of(mesh, factor)
         reached = mesh.half_edges.boundary_vertex.copy()
         reached[edges] = True
         own = mesh.components
@@ -265,6 +270,8 @@ class CopySearch:
     def smaller(self, trial: Trial, excess: Array) -> Ints:
         """Divide the regions whose excess (k,) is more than one."""
         label, mesh = trial.label, self.copy.mesh
+        if self.mirror is not None:
+            excess = np.maximum(excess, excess[self.mirror.partners(label)])
         bad = excess > 1.0
         level = np.zeros(len(label))
         for own in np.flatnonzero(bad):

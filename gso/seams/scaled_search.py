@@ -20,7 +20,7 @@ from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.region_merges import Merges
-from gso.seams.symmetry import Plane
+from gso.seams.symmetry import Plane, symmetric_points
 from gso.seams.trial import Allowed, Trial, tried
 from gso.seams.wanted import Wanted
 from gso.typing import Flags, Ints
@@ -153,6 +153,8 @@ def _carried(search: CopySearch, trial: Trial) -> Trial:
     divided = search.base_regions.cut_between(fields)
     smooth = search.opened(divided, copy.wanted.kept, search.base_apexes)
     start = base_start(copy, trial, smooth)
+    if search.plane is not None:
+        start = symmetric_points(smooth.design, start, search.plane)
     design = smooth.design.replaced(divided.moved(copy.base.vertices))
     return tried(
         trial.label,

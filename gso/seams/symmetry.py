@@ -100,6 +100,15 @@ def _moved(plane: Plane, points: Array, images: Array) -> Plane:
     return Plane(normal, float(normal @ (points.mean(axis=0) + images.mean(axis=0)) / 2.0))
 
 
+def symmetric_points(mesh: Mesh, points: Array, plane: Plane) -> Array:
+    """Return points (n, 3) for a mesh, displaced by the mean of both halves."""
+    moved = points - mesh.vertices
+    face, share, _ = Nearest(mesh).locate(plane.mirrored(mesh.vertices))
+    image = np.einsum("nk,nkd->nd", share, moved[mesh.faces[face]])
+    image -= 2.0 * np.outer(image @ plane.normal, plane.normal)
+    return np.asarray(mesh.vertices + 0.5 * (moved + image))
+
+
 @dataclass(frozen=True, eq=False)
 class Mirror:
     """A plane of symmetry of a mesh in regions.
