@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from gso.seams.disks import opening
     from gso.seams.regions import Regions
     from gso.seams.search import pieces
-    from gso.seams.search_result import turned_at_seams
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
+    from gso.seams.turned_faces import turned_at_seams
 
 __all__ = [
     "CoarseCopy",
@@ -55,7 +55,7 @@ __getattr__, __dir__ = at_first_use(
         "disks": "opening",
         "regions": "Regions",
         "search": "pieces",
-        "search_result": "turned_at_seams",
+        "turned_faces": "turned_at_seams",
         "segmentation": "Segmentation",
         "sheets": "Sheet",
     },

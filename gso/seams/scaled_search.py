@@ -166,6 +166,7 @@ def _carried(search: CopySearch, trial: Trial) -> Trial:
         repairs=_REPAIRS,
         executor=search.settings.executor,
         width=trial.width,
+        curvature=trial.curvature,
     )
 
 

@@ -8,15 +8,15 @@ import numpy as np
 
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
-from gso.geometry import chain_turns, quad_area_vectors
+from gso.geometry import chain_turns
 from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
-from gso.mesh.topology import four_corners
 from gso.result import Result
 from gso.seams.candidates import Candidate
 from gso.seams.facets import FACETS, mean_angle
 from gso.seams.options import NECK, PieceSettings
 from gso.seams.segmentation import Segmentation
+from gso.seams.turned_faces import turned_at_seams
 from gso.typing import Ints
 from gso.verdict import Code, Measurement, compare
 from gso.verdict.surface_checks import crossed, of_surface
@@ -119,26 +119,6 @@ def packed(
         given,
         kept,
     )
-
-
-def turned_at_seams(result: Result) -> Ints:
-    """Return the faces that have turned over, and at a seam lie on the neighbouring piece.
-
-    A sharp edge between two pieces alone is no fold, such as the rim of a thin shell.
-
-    Parameters
-    ----------
-    result : Result
-        A joint solve with its pieces.
-    """
-    if result.pieces is None:
-        raise ValueError("a result without pieces has no seams")
-    folds = np.setdiff1d(faults.folded(result.pieces.design), faults.folded(result.mesh))
-    corners = four_corners(result.mesh.faces[folds])
-    before, after = (
-        quad_area_vectors(mesh.vertices, corners) for mesh in (result.design, result.mesh)
-    )
-    return np.asarray(folds[np.einsum("fd,fd->f", before, after) < 0.0])
 
 
 def _of_sheets(found: Candidate) -> dict[Code, Measurement]:

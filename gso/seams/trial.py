@@ -20,6 +20,7 @@ from gso.seams.joint_solve import solve_pieces
 from gso.seams.kinds import Edges
 from gso.seams.regions import Divided, with_flips
 from gso.seams.sheets import Sheet
+from gso.seams.turned_faces import turned_at_seams
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
@@ -35,9 +36,13 @@ _FOLD, _ROOT, _MOST = 0.02, 0.25, 2.5
 #: Largest distance, strain and number of folds (a share of the faces, and a number) of a result
 #: that is solved again with more weight on what is too large.
 _FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.4, 12.0, 0.002, 12
+#: Largest strain where the shape to begin with is known to hold on a copy.
+_KNOWN = 100.0
 #: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
 #: rounds in which vertices of folds move between their neighbours.
 _BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (2.0, 6.0), 12, 10
+#: Factor on the weight of fairness where faces are folded.
+_FAIRER = 2.5
 #: Excess up to which little is missing.
 _CLOSE = 1.08
 #: Angle in degrees from which on an edge of a folded face is flipped.
@@ -81,6 +86,8 @@ class Trial:
         allowed.
     width : float
         Of the diffusion that made the boundaries fair.
+    curvature : float
+        Factor on the weight of curvature of the solve.
     """
 
     label: Ints
@@ -90,13 +97,17 @@ class Trial:
     sheets: tuple[Sheet | None, ...]
     distance: Array
     strain: Array
-    width: float = 0.0
+    width: float
+    curvature: float
 
     @cached_property
     def folded(self) -> Ints:
-        """The faces that are folded inside pieces, and are not in the design."""
+        """The faces that are folded inside pieces or onto others, and are not in the design."""
         before = faults.folded(self.pieces.opened.mesh)
-        return np.setdiff1d(faults.folded(self.shape.opened.mesh), before)
+        found = np.setdiff1d(faults.folded(self.shape.opened.mesh), before)
+        if self.result is None or self.result.pieces is None:
+            return found
+        return np.union1d(found, turned_at_seams(self.result))
 
     @cached_property
     def folds(self) -> Ints:
@@ -143,13 +154,13 @@ def _solved(pieces: Pieces, result: Result | None) -> Pieces:
     return pieces if result is None or result.pieces is None else result.pieces
 
 
-def options_for(distance: float) -> Options:
+def options_for(distance: float, curvature: float) -> Options:
     """Return the settings of a joint solve within a distance."""
     own = Options().for_pieces()
     return replace(
         own,
         w_fairness=_FAIR * own.w_fairness,
-        w_curvature=_CURVED * own.w_curvature,
+        w_curvature=curvature * _CURVED * own.w_curvature,
         w_proximity=_NEAR * own.w_proximity,
         reach=_REACH * distance,
         w_reach=_WEIGHT,
@@ -166,6 +177,7 @@ def tried(
     repairs: int = 1,
     executor: Executor = SERIAL,
     width: float = 0.0,
+    curvature: float = 1.0,
 ) -> Trial:
     """Solve and measure pieces.
 
@@ -188,8 +200,11 @@ def tried(
         Lays pieces flat; the result does not depend on it.
     width : float
         Of the diffusion that made the boundaries fair.
+    curvature : float
+        Factor on the weight of curvature.
     """
-    own = options_for(allowed.distance)
+    own = options_for(allowed.distance, curvature)
+    unit, known = own.w_curvature / curvature, start is not None
     found: list[Trial] = []
     for number in range(2 * repairs + 1):
         begin = Start(start, iterations=iterations if start is not None else None)
@@ -198,9 +213,10 @@ def tried(
             result = solve_pieces(pieces, asked)
         except MeshError:
             result = None
-        trial = _measured(label, divided, pieces, result, allowed, executor, width)
+        more = own.w_curvature / unit
+        trial = _measured(label, divided, pieces, result, allowed, executor, width, more)
         found.append(trial)
-        if trial.holds or result is None or not _repairable(trial):
+        if trial.holds or result is None or not _repairable(trial, known):
             break
         if number >= repairs and trial.excess.max() > _CLOSE:
             break
@@ -210,12 +226,12 @@ def tried(
     return min(found, key=lambda one: float(one.excess.max()))
 
 
-def _repairable(trial: Trial) -> bool:
+def _repairable(trial: Trial, known: bool) -> bool:
     """Whether what is too large is so little that another solve from there may do."""
     far, strain = float(trial.distance.max()), float(trial.strain.max())
     folds = int(trial.folds.sum())
     most = _DOUBTFUL_FOLDS * len(trial.pieces.design.faces) + _SOME_FOLDS
-    return far <= _FAR and strain <= _STRAINED and folds <= most
+    return far <= _FAR and strain <= (_KNOWN if known else _STRAINED) and folds <= most
 
 
 def _stricter(options: Options, trial: Trial) -> Options:
@@ -223,6 +239,8 @@ def _stricter(options: Options, trial: Trial) -> Options:
     far, strain = float(trial.distance.max()), float(trial.strain.max())
     if far > 1.0 and options.reach is not None:
         options = replace(options, reach=options.reach * _BELOW / far)
+    if trial.folds.any():
+        options = replace(options, w_fairness=_FAIRER * options.w_fairness)
     if strain > 1.0:
         more = float(np.clip(strain, *_MORE))
         options = replace(options, w_curvature=more * options.w_curvature)
@@ -237,13 +255,15 @@ def _measured(
     allowed: Allowed,
     executor: Executor,
     width: float,
+    curvature: float,
 ) -> Trial:
     # Flips change the areas of pieces, and so perhaps their order.
     region = divided.label[[part.faces[0] for part in pieces.parts]]
     shape = _solved(pieces, result)
     sheets = tuple(executor.map(_laid, [part.mesh for part in shape.parts]))
     strain = np.array([np.inf if one is None else one.strain for one in sheets]) / allowed.strain
-    return Trial(label, pieces, region, result, sheets, _away(shape, allowed), strain, width)
+    far = _away(shape, allowed)
+    return Trial(label, pieces, region, result, sheets, far, strain, width, curvature)
 
 
 def _away(shape: Pieces, allowed: Allowed) -> Array:
