@@ -80,6 +80,11 @@ def _of_copy(search: CopySearch) -> list[Trial]:
         if any(one.holds for one in found) or _hopeless(found[-1]):
             break
     best = min(found, key=lambda one: _rank(one, search.settings))
+    if not best.holds and not _hopeless(best):
+        # Most of the design holds in no division: go on with the one that holds in most places.
+        best = min(found, key=lambda one: _failed(search, one))
+        found += _refined(search, search.smaller(best, best.of_regions()), len(found), most=1.0)
+        best = min(found, key=lambda one: _rank(one, search.settings))
     if not best.holds:
         return [best]
     merges = Merges(search, best)
@@ -88,22 +93,30 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     return merges.found
 
 
-def _refined(search: CopySearch, label: Ints, before: int) -> list[Trial]:
-    """Try regions, and divide those that do not hold as long as these are few or nearly do."""
+def _refined(search: CopySearch, label: Ints, before: int, most: float = _FEW) -> list[Trial]:
+    """Try regions, and divide those that do not hold as long as these are few or nearly do.
+
+    Few are those with up to some share of the area.
+    """
     found: list[Trial] = []
     while True:
         number = before + len(found) + 1
         search.settings.say(f"seams and shape, attempt {number}: {label.max() + 1} pieces")
         found.append(search.measured(label))
-        trial, excess = found[-1], found[-1].of_regions()
-        area = np.bincount(label, search.regions.face_area)
-        few = area[excess > 1.0].sum() <= _FEW * area.sum() or excess.max() <= _LITTLE
+        trial = found[-1]
+        few = _failed(search, trial) <= most or trial.excess.max() <= _LITTLE
         ends = trial.holds or _hopeless(trial) or not few
         if ends or len(found) > search.settings.effort.divisions:
             return found
-        label = search.smaller(trial, excess)
+        label = search.smaller(trial, trial.of_regions())
         if np.array_equal(label, trial.label):
             return found
+
+
+def _failed(search: CopySearch, trial: Trial) -> float:
+    """Return the share of the area in regions that do not hold."""
+    area = np.bincount(trial.label, search.regions.face_area)
+    return float(area[trial.of_regions() > 1.0].sum() / area.sum())
 
 
 def _hopeless(trial: Trial) -> bool:
@@ -166,7 +179,7 @@ def _carried(search: CopySearch, trial: Trial) -> Trial:
         repairs=_REPAIRS,
         executor=search.settings.executor,
         width=trial.width,
-        curvature=trial.curvature,
+        options=trial.options,
     )
 
 

@@ -35,14 +35,16 @@ _FAIR, _CURVED, _NEAR = 3.0, 2.0, 0.3
 _FOLD, _ROOT, _MOST = 0.02, 0.25, 2.5
 #: Largest distance, strain and number of folds (a share of the faces, and a number) of a result
 #: that is solved again with more weight on what is too large.
-_FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.4, 12.0, 0.002, 12
+_FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.6, 12.0, 0.03, 12
 #: Largest strain where the shape to begin with is known to hold on a copy.
-_KNOWN = 100.0
+_KNOWN = 200.0
 #: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
 #: rounds in which vertices of folds move between their neighbours.
 _BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (2.0, 6.0), 12, 10
-#: Factor on the weight of fairness where faces are folded.
-_FAIRER = 2.5
+#: Factor on the weight of distances beyond those that are aimed at, where they are too large.
+_NEARER = 2.0
+#: Range of the factor on the weight of fairness where faces are folded, and what each of them adds.
+_FAIRER, _SHARE_OF_FOLDS = (2.5, 8.0), 0.15
 #: Excess up to which little is missing.
 _CLOSE = 1.08
 #: Angle in degrees from which on an edge of a folded face is flipped.
@@ -86,8 +88,8 @@ class Trial:
         allowed.
     width : float
         Of the diffusion that made the boundaries fair.
-    curvature : float
-        Factor on the weight of curvature of the solve.
+    options : Options
+        Of the solve.
     """
 
     label: Ints
@@ -98,7 +100,7 @@ class Trial:
     distance: Array
     strain: Array
     width: float
-    curvature: float
+    options: Options
 
     @cached_property
     def folded(self) -> Ints:
@@ -154,13 +156,13 @@ def _solved(pieces: Pieces, result: Result | None) -> Pieces:
     return pieces if result is None or result.pieces is None else result.pieces
 
 
-def options_for(distance: float, curvature: float) -> Options:
+def options_for(distance: float) -> Options:
     """Return the settings of a joint solve within a distance."""
     own = Options().for_pieces()
     return replace(
         own,
         w_fairness=_FAIR * own.w_fairness,
-        w_curvature=curvature * _CURVED * own.w_curvature,
+        w_curvature=_CURVED * own.w_curvature,
         w_proximity=_NEAR * own.w_proximity,
         reach=_REACH * distance,
         w_reach=_WEIGHT,
@@ -177,7 +179,7 @@ def tried(
     repairs: int = 1,
     executor: Executor = SERIAL,
     width: float = 0.0,
-    curvature: float = 1.0,
+    options: Options | None = None,
 ) -> Trial:
     """Solve and measure pieces.
 
@@ -200,11 +202,12 @@ def tried(
         Lays pieces flat; the result does not depend on it.
     width : float
         Of the diffusion that made the boundaries fair.
-    curvature : float
-        Factor on the weight of curvature.
+    options : Options, optional
+        Of an earlier solve: the weights to begin with.
     """
-    own = options_for(allowed.distance, curvature)
-    unit, known = own.w_curvature / curvature, start is not None
+    own, known = options_for(allowed.distance), start is not None
+    if options is not None:
+        own = replace(options, reach=own.reach)
     found: list[Trial] = []
     for number in range(2 * repairs + 1):
         begin = Start(start, iterations=iterations if start is not None else None)
@@ -213,12 +216,11 @@ def tried(
             result = solve_pieces(pieces, asked)
         except MeshError:
             result = None
-        more = own.w_curvature / unit
-        trial = _measured(label, divided, pieces, result, allowed, executor, width, more)
+        trial = _measured(label, divided, pieces, result, allowed, executor, width, own)
         found.append(trial)
         if trial.holds or result is None or not _repairable(trial, known):
             break
-        if number >= repairs and trial.excess.max() > _CLOSE:
+        if number >= repairs and max(trial.distance.max(), trial.strain.max()) > _CLOSE:
             break
         own = _stricter(own, trial)
         start, iterations = _untangled(trial), _AGAIN
@@ -231,16 +233,18 @@ def _repairable(trial: Trial, known: bool) -> bool:
     far, strain = float(trial.distance.max()), float(trial.strain.max())
     folds = int(trial.folds.sum())
     most = _DOUBTFUL_FOLDS * len(trial.pieces.design.faces) + _SOME_FOLDS
-    return far <= _FAR and strain <= (_KNOWN if known else _STRAINED) and folds <= most
+    return far <= _FAR and strain <= (_KNOWN if known or folds else _STRAINED) and folds <= most
 
 
 def _stricter(options: Options, trial: Trial) -> Options:
     """Return settings with more weight on what is too large."""
     far, strain = float(trial.distance.max()), float(trial.strain.max())
     if far > 1.0 and options.reach is not None:
-        options = replace(options, reach=options.reach * _BELOW / far)
+        reach, weight = options.reach * _BELOW / far, _NEARER * options.w_reach
+        options = replace(options, reach=reach, w_reach=weight)
     if trial.folds.any():
-        options = replace(options, w_fairness=_FAIRER * options.w_fairness)
+        fairer = float(np.clip(_SHARE_OF_FOLDS * trial.folds.sum(), *_FAIRER))
+        options = replace(options, w_fairness=fairer * options.w_fairness)
     if strain > 1.0:
         more = float(np.clip(strain, *_MORE))
         options = replace(options, w_curvature=more * options.w_curvature)
@@ -255,7 +259,7 @@ def _measured(
     allowed: Allowed,
     executor: Executor,
     width: float,
-    curvature: float,
+    options: Options,
 ) -> Trial:
     # Flips change the areas of pieces, and so perhaps their order.
     region = divided.label[[part.faces[0] for part in pieces.parts]]
@@ -263,7 +267,7 @@ def _measured(
     sheets = tuple(executor.map(_laid, [part.mesh for part in shape.parts]))
     strain = np.array([np.inf if one is None else one.strain for one in sheets]) / allowed.strain
     far = _away(shape, allowed)
-    return Trial(label, pieces, region, result, sheets, far, strain, width, curvature)
+    return Trial(label, pieces, region, result, sheets, far, strain, width, options)
 
 
 def _away(shape: Pieces, allowed: Allowed) -> Array:
