@@ -30,7 +30,7 @@ _ROOM = 0.95
 #: Bounds on the estimated distance over the allowed one that are tried, in turn.
 LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
 #: Numbers of patches, and how much compact pieces are preferred.
-_PATCHES, _COMPACT = (100, 200), (2.0, 5.0)
+_PATCHES, _COMPACT = (50, 100, 200, 400), (2.0, 5.0, 10.0)
 #: Range of the factor on the bound of a piece that is divided.
 _SMALLER = (0.35, 0.8)
 #: Width of the diffusion that makes boundaries fair: in mean edges of the copy, and in necks where
@@ -44,6 +44,8 @@ _APEX = 60.0
 _SMALL = 0.08
 #: Area of a region over the whole below which it always goes to a neighbour.
 _TINY = 0.003
+#: Number of patches of regions that are divided.
+_FINER = 200
 #: Share of faces that seams should avoid from which on these regions are divided all the same.
 _HALF = 0.5
 #: How often pieces that nearly hold are solved again.
@@ -165,7 +167,8 @@ class CopySearch:
             for compact in _COMPACT:
                 own = self.regions.fair(self.merged(label, bound, compact), self.width)
                 found.append(self.alike(self.without_small(own, _SMALL)))
-        return sorted(found, key=self.value)
+        found.sort(key=self.value)
+        return [x for k, x in enumerate(found) if not any((x == y).all() for y in found[:k])]
 
     def fair(self, label: Ints, width: float) -> Ints:
         """Make the boundaries of regions fair that nearly are."""
@@ -201,8 +204,8 @@ class CopySearch:
             else:
                 return label
 
-    def measured(self, label: Ints, width: float | None = None) -> Trial:
-        """Solve and measure regions of the copy."""
+    def measured(self, label: Ints, width: float | None = None, most: float = np.inf) -> Trial:
+        """Solve and measure regions of the copy; repair them up to some excess."""
         regions, width = self.regions, self.width if width is None else width
         fields = regions.fields(label, width)
         if self.mirror is not None:
@@ -216,6 +219,7 @@ class CopySearch:
             repairs=_REPAIRS,
             executor=self.settings.executor,
             width=width,
+            most=most,
         )
 
     @cached_property
@@ -280,7 +284,7 @@ class CopySearch:
             found = LEVELS[0] if found is None else max(found, LEVELS[-1] / 2)
             level[faces] = found * float(np.clip(1.0 / excess[own], *_SMALLER))
         kept = np.concatenate([edges_between(mesh, label), self.copy.lines])
-        finer = patches(mesh, max(_PATCHES[-1], 4 * len(excess)), kept)
+        finer = patches(mesh, max(_FINER, 4 * len(excess)), kept)
         start = numbered(np.where(bad[label], finer + len(excess), label))
         ground, regions = self.ground, self.regions
         avoided = np.asarray(self.copy.wanted_of_copy.avoided[mesh.faces].all(axis=1))

@@ -35,7 +35,8 @@ class Effort:
     budgets : int
         How many solves merge pieces, or move seams, where a budget does not hold.
     variants : int
-        How many divisions are tried for each bound on the estimate.
+        How many divisions are tried for each bound on the estimate, the best by number of pieces
+        and seam first.
     """
 
     divisions: int
@@ -47,9 +48,9 @@ class Effort:
 
 #: By name, the fastest first.
 EFFORTS = {
-    "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=1),
-    "standard": Effort(divisions=3, merges=8, rounds=4, budgets=12, variants=1),
-    "best": Effort(divisions=4, merges=24, rounds=6, budgets=30, variants=3),
+    "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=3),
+    "standard": Effort(divisions=3, merges=8, rounds=4, budgets=12, variants=6),
+    "best": Effort(divisions=4, merges=24, rounds=6, budgets=30, variants=12),
 }
 
 

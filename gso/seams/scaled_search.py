@@ -28,6 +28,8 @@ from gso.typing import Flags, Ints
 #: Share of the area in pieces that do not hold, or largest excess of these, up to which they alone
 #: are divided.
 _FEW, _LITTLE = 0.4, 1.5
+#: Excess up to which a first solve of a division is repaired.
+_NEARLY = 1.15
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
 _HOPELESS, _MANY = 20.0, 150
 #: Iterations of the solve of the design, from the shape of the copy.
@@ -74,10 +76,13 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     effort = search.settings.effort
     found: list[Trial] = []
     for level in LEVELS:
-        for label in search.divided(level)[: effort.variants]:
-            if not any(np.array_equal(label, one.label) for one in found):
-                found += _refined(search, label, len(found))
-        if any(one.holds for one in found) or _hopeless(found[-1]):
+        labels = [one for one in search.divided(level) if not _known(one, found)]
+        some = _first(search, labels[: effort.variants])
+        if some and not some[-1].holds:
+            best = min(some, key=lambda one: float(one.excess.max()))
+            some += _refined(search, best.label, len(found) + len(some))
+        found += some
+        if any(one.holds for one in found) or (found and _hopeless(found[-1])):
             break
     best = min(found, key=lambda one: _rank(one, search.settings))
     if not best.holds and not _hopeless(best):
@@ -91,6 +96,22 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     merges.run(effort.merges)
     merges.meet(effort.budgets)
     return merges.found
+
+
+def _known(label: Ints, found: list[Trial]) -> bool:
+    return any(np.array_equal(label, one.label) for one in found)
+
+
+def _first(search: CopySearch, labels: list[Ints]) -> list[Trial]:
+    """Try divisions until one holds, which is the last one then."""
+    found: list[Trial] = []
+    for number, label in enumerate(labels, 1):
+        pieces = int(label.max()) + 1
+        search.settings.say(f"seams, way {number} of {len(labels)}: {pieces} pieces")
+        found.append(search.measured(label, most=_NEARLY))
+        if found[-1].holds:
+            break
+    return found
 
 
 def _refined(search: CopySearch, label: Ints, before: int, most: float = _FEW) -> list[Trial]:

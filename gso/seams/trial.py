@@ -180,6 +180,7 @@ def tried(
     executor: Executor = SERIAL,
     width: float = 0.0,
     options: Options | None = None,
+    most: float = np.inf,
 ) -> Trial:
     """Solve and measure pieces.
 
@@ -204,6 +205,8 @@ def tried(
         Of the diffusion that made the boundaries fair.
     options : Options, optional
         Of an earlier solve: the weights to begin with.
+    most : float
+        Excess up to which a result is solved again.
     """
     own, known = options_for(allowed.distance), start is not None
     if options is not None:
@@ -219,6 +222,8 @@ def tried(
         trial = _measured(label, divided, pieces, result, allowed, executor, width, own)
         found.append(trial)
         if trial.holds or result is None or not _repairable(trial, known):
+            break
+        if number == 0 and trial.excess.max() > most:
             break
         if number >= repairs and max(trial.distance.max(), trial.strain.max()) > _CLOSE:
             break
