@@ -7,7 +7,8 @@ import gso
 from gso import metrics
 from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
-from gso.seams import CoarseCopy, Creases, Regions
+from gso.mesh.slicing import lines_through
+from gso.seams import CoarseCopy, Creases, Regions, Segmentation, Slice
 
 
 def ball(side: int) -> Mesh:
@@ -127,6 +128,35 @@ class TestRegions:
         assert len(divided.mesh.vertices) == len(mesh.vertices)
 
 
+def skew_ball() -> Mesh:
+    """A ball that is only symmetric from x to -x, with vertices that have no mirror images."""
+    side = 36
+    t = np.linspace(-1, 1, side)
+    x, y = np.meshgrid(t + 0.15 * (1 - t * t), t, indexing="ij")
+    x = x + 0.1 * (1 - x * x) * y
+    height = (1 + 0.3 * y) * np.sqrt(2.2 - x**2 - y**2)
+    grid = Mesh.from_grid(np.dstack([x, y, 0.8 * height]))
+    return Mesh(grid.vertices, grid.triangles)
+
+
+def searched(**options) -> Segmentation:
+    """Pieces of the ball, at a first look."""
+    return gso.pieces(ball(36), max_deviation=0.03, effort="draft", workers=0, **options)
+
+
+@pytest.fixture(scope="module")
+def free() -> Segmentation:
+    """Pieces of which nothing else is asked."""
+    return searched()
+
+
+class TestLines:
+    def test_they_go_through_new_vertices(self):
+        lines = np.array([[0, 1], [4, 3], [1, 2]])
+        found = lines_through(lines, np.array([[3, 4], [0, 1], [5, 6]]), 7)
+        assert found.tolist() == [[0, 8], [8, 1], [4, 7], [7, 3], [1, 2]]
+
+
 class TestTheSearch:
     def test_pieces_hold_the_distance_and_use_it(self):
         mesh = ball(36)
@@ -144,6 +174,60 @@ class TestTheSearch:
             assert Nearest(two).distances(middles).max() <= 1.001 * allowed
         for piece in found:
             assert piece.is_disk
+
+    def test_budgets_change_the_result_or_are_named(self, free):
+        few = searched(max_pieces=1)
+        assert len(few) <= len(free)
+        assert [reason.code for reason in few.reasons] in ([], ["pieces"])
+        # No piece of it is as long as the whole.
+        long = searched(min_size=5.0)
+        assert not long.usable
+        assert {reason.code for reason in long.reasons} == {"too_short"}
+
+    def test_necks_become_wider(self, free):
+        least = 1.2 * free.metrics["neck"]
+        wide = searched(min_neck=least)
+        assert wide.metrics["neck"] >= least or "neck" in {r.code for r in wide.reasons}
+
+    def test_kept_seams_stay_and_others_join_them(self):
+        found = searched(keep=Slice([0.3, 0, 0], [1, 0.2, 0]))
+        assert found.usable, found.reasons
+        height = (found.design.vertices - [0.3, 0, 0]) @ [1, 0.2, 0]
+        given = found.given.vertices
+        on = np.abs((given - [0.3, 0, 0]) @ [1, 0.2, 0]) < 1e-9
+        assert on.sum() > 30
+        seam = np.zeros(len(height), bool)
+        seam[found.edges] = True
+        rim = found.design.half_edges.boundary_vertex
+        assert (seam | rim)[: len(given)][on].all()
+
+    def test_seams_keep_away_from_faces(self, free):
+        middle = ball(36).vertices[ball(36).faces].mean(axis=1)
+        found = searched(avoid=np.hypot(middle[:, 0], middle[:, 1]) < 0.35)
+        assert found.usable, found.reasons
+        ends = found.design.vertices[found.edges].mean(axis=1)
+        inside = np.hypot(ends[:, 0], ends[:, 1]) < 0.3
+        assert found.lengths[inside].sum() < 0.02 * found.lengths.sum()
+
+    def test_symmetric_seams_need_no_symmetric_mesh(self):
+        found = gso.pieces(
+            skew_ball(), max_deviation=0.06, symmetric=True, effort="draft", workers=0
+        )
+        assert found.usable, found.reasons
+        points = found.design.vertices[found.edges].mean(axis=1)
+        mirrored = points * [-1.0, 1.0, 1.0]
+        away = np.linalg.norm(points[:, None] - mirrored[None], axis=2).min(axis=1)
+        assert away.max() < 0.02 * found.design.diagonal
+
+    def test_what_is_not_symmetric_is_refused(self):
+        bent = ball(36)
+        points = bent.vertices + np.stack(
+            [0 * bent.vertices[:, 0]] * 2
+            + [0.6 * np.sin(2.0 * bent.vertices[:, 0] + bent.vertices[:, 1] ** 3)],
+            axis=1,
+        )
+        with pytest.raises(gso.OptionError, match="no plane of symmetry"):
+            gso.pieces(bent.replaced(points), max_deviation=0.06, symmetric=True, workers=0)
 
     @pytest.mark.parametrize("allowed", [1e-200, 3.0, 1e80])
     def test_any_distance_has_a_copy(self, allowed):

@@ -142,8 +142,7 @@ def pieces(
         edges or away from faces, are searched for in any case.
     effort : {"draft", "standard", "best"}
         How long to search where the shape of a triangle mesh of 1,000 vertices or more may change:
-        a first look, the usual, or for fewer pieces. Searches with symmetric seams, with seams
-        `along` edges, away from faces or given, take no notice of it.
+        a first look, the usual, or for fewer pieces.
     workers : int, optional
         Number of processes, which a search with `max_deviation` uses; one for each processor by
         default, 0 for this one alone. The result does not depend on it.
