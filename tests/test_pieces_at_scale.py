@@ -157,6 +157,32 @@ class TestLines:
         assert found.tolist() == [[0, 8], [8, 1], [4, 7], [7, 3], [1, 2]]
 
 
+class TestNoise:
+    def test_it_is_not_cut(self):
+        smooth = ball(36)
+        noise = np.random.default_rng(0).normal(0, 0.004, smooth.vertices.shape)
+        rough = smooth.replaced(smooth.vertices + noise)
+        allowed = {"max_strain": 0.02, "workers": 0}
+        cut = gso.pieces(rough, **allowed)
+        assert any("noisy" in note for note in cut.notes)
+        found = gso.pieces(rough, denoise="auto", **allowed)
+        assert len(found) <= 0.5 * len(cut)
+        assert found.seam_length < 0.7 * cut.seam_length
+        assert any("was denoised" in note for note in found.notes)
+        # No farther than the noise.
+        away = np.linalg.norm(found.given.vertices - rough.vertices, axis=1)
+        assert 0.001 < away.mean() < away.max() < 6 * 0.004
+
+    def test_smooth_designs_stay(self):
+        found = gso.pieces(ball(20), max_strain=0.05, denoise="auto")
+        assert not any("denoised" in note for note in found.notes)
+        np.testing.assert_array_equal(found.given.vertices, ball(20).vertices)
+
+    def test_another_word_is_an_error(self):
+        with pytest.raises(gso.OptionError, match="denoise is 'yes'"):
+            gso.pieces(ball(8), denoise="yes")
+
+
 class TestTheSearch:
     def test_pieces_hold_the_distance_and_use_it(self):
         mesh = ball(36)

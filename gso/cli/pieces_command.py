@@ -38,6 +38,11 @@ if TYPE_CHECKING:
 @shared.sheet
 @shared.keep_groups
 @click.option("--denoise", is_flag=True, help="Denoise the design first, such as a scan.")
+@click.option(
+    "--denoise-auto",
+    is_flag=True,
+    help="Denoise the design only if it is noisy, and no farther than its noise is large.",
+)
 @shared.seam_effort
 @shared.unit
 @shared.workers
@@ -52,6 +57,8 @@ def pieces(
     force: bool,
     quiet: bool,
     keep_groups: bool,
+    denoise: bool,
+    denoise_auto: bool,
     along: str | None,
     avoid: str | None,
     **given: Any,
@@ -69,6 +76,9 @@ def pieces(
     from gso.seams import pieces as search
     from gso.seams.piece_files import save
 
+    if denoise and denoise_auto:
+        raise OptionError("--denoise and --denoise-auto exclude each other; give one of them")
+    given["denoise"] = "auto" if denoise_auto else denoise
     if os.path.isfile(folder):
         raise OptionError(f"{folder} is a file; -o names a folder")
     outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json")]

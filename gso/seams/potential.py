@@ -99,8 +99,8 @@ class Potential:
             out[free] = -spd(own)(self.curvature[free])
         return out
 
-    def smoothed(self, edges: float = 3.0) -> Array:
-        """Return the integrated curvature (n,) after diffusion over a length of some mean edges."""
+    def smoothed(self, inner: Flags, edges: float = 3.0) -> Array:
+        """Return the integrated curvature (n,) of some vertices (n,), diffused over some edges."""
         n = len(self.area)
         size = max(float(self.area.sum()) / max(int((self.area > 0).sum()), 1), 1e-300)
         mass = np.maximum(self.area, 1e-9 * size)
@@ -108,7 +108,7 @@ class Potential:
         system = coo_matrix((mass, (np.arange(n), np.arange(n))), shape=(n, n)) + (
             step * self.stiffness
         )
-        return np.asarray(mass * spd(system)(self.curvature))
+        return np.asarray(mass * spd(system)(np.where(inner, self.curvature, 0.0)))
 
     def strain(self, scale: Array, within: Ints | None = None) -> float:
         """Estimate the 99th percentile of the least strain of a flat image from its u (n,).

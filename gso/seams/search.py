@@ -16,7 +16,6 @@ from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, OptionError
 from gso.executors import open_executor, processors
 from gso.mesh import Mesh
-from gso.pipeline.component_solves import solve_mesh
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.result import Result
 from gso.seams.candidates import (
@@ -29,19 +28,19 @@ from gso.seams.candidates import (
 )
 from gso.seams.cutting import cut
 from gso.seams.dartless import dartless
-from gso.seams.design_noise import noise
+from gso.seams.design_noise import noise, without_noise
 from gso.seams.edge_prices import Avoid, Follow, pairs_of, prices
 from gso.seams.exact_pieces import exact_pieces
 from gso.seams.kinds import Edges, Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, too_large
+from gso.seams.potential import Potential
 from gso.seams.reshaping import at_scale, reshaped
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
 from gso.seams.symmetry import plane_of
 from gso.seams.tree import Ground
-from gso.tasks import check
 from gso.typing import Array, Ints, MeshLike
 from gso.unfolding.manifold import edges_between, manifold_mesh
 from gso.verdict import crosses_itself
@@ -76,7 +75,7 @@ def pieces(
     keep: Kept = None,
     along: Follow | None = None,
     avoid: Avoid | None = None,
-    denoise: bool = False,
+    denoise: bool | str = False,
     as_it_is: bool = True,
     effort: str = "standard",
     workers: int | None = None,
@@ -135,8 +134,9 @@ def pieces(
     avoid : array_like of int (k,), of bool (m,), or (k, 3), Polyline, or sequence, optional
         What seams should keep away from: faces, a mask of all faces, or polylines, which are the
         faces that they pass over.
-    denoise : bool
-        Denoise the design first, such as a scan.
+    denoise : bool or "auto"
+        Denoise the design first, such as a scan; "auto": only if it is noisy, and no farther than
+        its noise is large. A note says how far vertices moved.
     as_it_is : bool
         Ask first whether the design is developable as it is. Symmetric seams, and seams `along`
         edges or away from faces, are searched for in any case.
@@ -207,7 +207,8 @@ def pieces(
         say=callback or (lambda said: None),
         effort=effort_named(effort),
     )
-    design, kept = _read(design, keep, denoise)
+    design, kept, done = _read(design, keep, denoise)
+    said = (*said, *done)
     factor = prices(design, along, avoid)
     out = None
     if as_it_is and factor is None and not symmetric:
@@ -271,18 +272,20 @@ def _searched(
     return replace(out, notes=(*out.notes, said)) if said else out
 
 
-def _read(design: Mesh, keep: Kept, denoise: bool) -> tuple[Mesh, Ints]:
-    """Return the design to cut, and the edges of it (k, 2) that are cut in any case."""
-    kept = np.empty((0, 2), np.int64)
+def _read(design: Mesh, keep: Kept, denoise: bool | str) -> tuple[Mesh, Ints, list[str]]:
+    """Return the design to cut, the edges of it (k, 2) that are cut in any case, and notes."""
+    kept, notes = np.empty((0, 2), np.int64), []
     if isinstance(keep, Pieces):
         design, kept = _again(design, keep), keep.edges
-    if denoise:
-        smoothed = solve_mesh(check("denoise", verdict=False), design)
-        design = design.replaced(smoothed.mesh.vertices)
+    if denoise not in (False, True, "auto"):
+        raise OptionError(f'denoise is {denoise!r}; it must be True, False or "auto"')
+    if denoise is True or (denoise == "auto" and noise(design, Potential(design))):
+        design, said = without_noise(design, within=denoise == "auto")
+        notes.append(said)
     if keep is not None and not isinstance(keep, Pieces):
         begun = cut(design, keep)
         design, kept = begun.design, begun.edges
-    return design, kept
+    return design, kept, notes
 
 
 def _again(design: Mesh, keep: Pieces) -> Mesh:
