@@ -7,7 +7,6 @@ import gso
 from gso import metrics
 from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
-from gso.mesh.slicing import lines_through
 from gso.seams import CoarseCopy, Creases, Regions, Segmentation, Slice
 
 
@@ -148,13 +147,6 @@ def searched(**options) -> Segmentation:
 def free() -> Segmentation:
     """Pieces of which nothing else is asked."""
     return searched()
-
-
-class TestLines:
-    def test_they_go_through_new_vertices(self):
-        lines = np.array([[0, 1], [4, 3], [1, 2]])
-        found = lines_through(lines, np.array([[3, 4], [0, 1], [5, 6]]), 7)
-        assert found.tolist() == [[0, 8], [8, 1], [4, 7], [7, 3], [1, 2]]
 
 
 class TestNoise:

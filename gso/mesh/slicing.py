@@ -78,8 +78,9 @@ def parts_of(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
 def lines_through(lines: Ints, edges: Ints, count: int) -> Ints:
     """Return lines (l, 2) of a mesh of `count` vertices after :func:`divided`, as edges of it.
 
-    >>> lines_through(np.array([[0, 1], [2, 1]]), np.array([[1, 2]]), 3).tolist()
-    [[0, 1], [2, 3], [3, 1]]
+    >>> lines = np.array([[0, 1], [4, 3], [1, 2]])
+    >>> lines_through(lines, np.array([[3, 4], [0, 1], [5, 6]]), 7).tolist()
+    [[0, 8], [8, 1], [4, 7], [7, 3], [1, 2]]
     """
     if not len(lines) or not len(edges):
         return lines

@@ -64,19 +64,34 @@ class SeamRequest:
         given = {"symmetric": self.symmetric, "along": len(self.along), "avoid": len(self.avoid)}
         return tuple(name for name, value in given.items() if value)
 
-    def searched(self, design: Mesh) -> Mesh:
+    def searched(self, design: Mesh, allowed: float | None) -> Mesh:
         """Return the mesh to search: triangles, whose seams need not follow edge rows.
+
+        Parameters
+        ----------
+        design : Mesh
+        allowed : float or None
+            Distance within which its shape may change.
 
         Raises
         ------
         OptionError
-            Seams are to be symmetric, and the design is not; its triangles may not be, either,
-            so that quads are kept.
+            Seams are to be symmetric, and the design is not. Where it has to be so vertex by
+            vertex, the triangles of quads are not, so that quads are kept.
         """
-        if self.symmetric:
+        # These import SciPy.
+        from gso.seams.reshaping import at_scale
+        from gso.seams.symmetry import plane_of
+
+        triangles = design
+        if not design.is_triangles:
+            triangles = Mesh(design.vertices, design.triangles)
+        if self.symmetric and allowed is not None and at_scale(triangles):
+            plane_of(triangles)
+        elif self.symmetric:
             mirror_of(design)
             return design
-        return design if design.is_triangles else Mesh(design.vertices, design.triangles)
+        return triangles
 
     def keywords(self, design: Mesh, mesh: Mesh) -> Keywords:
         """Return keywords of :func:`gso.pieces` for a mesh on the vertices of the design."""

@@ -267,7 +267,7 @@ def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int
         named=given.is_marked or bool(asked.preferences),
     )
     # Seams of a design that is not symmetric are not symmetric: nothing else will do.
-    asked.searched(light.mesh)
+    asked.searched(light.mesh, light.allowed)
     tried = []
     if not len(given.kept) and parametrization.flattens(light.mesh):
         say("as a whole")
@@ -308,7 +308,7 @@ def _of_search(
     from gso.seams import pieces as search
 
     asked = _seams(given, settings)
-    searched = asked.searched(mesh)
+    searched = asked.searched(mesh, allowed)
     found = search(
         searched,
         max_strain=settings.strain,

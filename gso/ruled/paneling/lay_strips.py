@@ -340,7 +340,7 @@ class _Task:
         failed: GSOError | None = None
         if self.division is None:
             # Seams of a design that is not symmetric are not symmetric: nothing else will do.
-            asked.seams.searched(light.mesh)
+            asked.seams.searched(light.mesh, light.allowed)
         for division in self._divisions(light):
             try:
                 tried.append(self._in_pieces(light, division()))

@@ -223,7 +223,7 @@ def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Se
     MeshError
         A piece cannot be laid flat.
     """
-    mesh = request.seams.searched(light.mesh)
+    mesh = request.seams.searched(light.mesh, light.allowed)
     found = search(
         mesh,
         max_strain=request.max_strain,
