@@ -30,6 +30,8 @@ from gso.typing import Flags, Ints
 _FEW, _LITTLE = 0.4, 1.5
 #: Excess up to which a first solve of a division is repaired.
 _NEARLY = 1.15
+#: Excess of all of some divisions from which on others with as many pieces are not tried.
+_FAR, _ENOUGH = 2.0, 3
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
 _HOPELESS, _MANY = 20.0, 150
 #: Iterations of the solve of the design, from the shape of the copy.
@@ -80,7 +82,9 @@ def _of_copy(search: CopySearch) -> list[Trial]:
         some = _first(search, labels[: effort.variants])
         if some and not some[-1].holds:
             best = min(some, key=lambda one: float(one.excess.max()))
-            some += _refined(search, best.label, len(found) + len(some))
+            if _NEARLY < best.excess.max() <= _LITTLE:
+                some.append(best := search.measured(best.label))
+            some += _refined(search, best)
         found += some
         if any(one.holds for one in found) or (found and _hopeless(found[-1])):
             break
@@ -88,7 +92,7 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     if not best.holds and not _hopeless(best):
         # Most of the design holds in no division: go on with the one that holds in most places.
         best = min(found, key=lambda one: _failed(search, one))
-        found += _refined(search, search.smaller(best, best.of_regions()), len(found), most=1.0)
+        found += _refined(search, best, most=1.0)
         best = min(found, key=lambda one: _rank(one, search.settings))
     if not best.holds:
         return [best]
@@ -109,29 +113,29 @@ def _first(search: CopySearch, labels: list[Ints]) -> list[Trial]:
         pieces = int(label.max()) + 1
         search.settings.say(f"seams, way {number} of {len(labels)}: {pieces} pieces")
         found.append(search.measured(label, most=_NEARLY))
-        if found[-1].holds:
+        far = min(float(one.excess.max()) for one in found) > _FAR
+        if found[-1].holds or (far and number >= _ENOUGH):
             break
     return found
 
 
-def _refined(search: CopySearch, label: Ints, before: int, most: float = _FEW) -> list[Trial]:
-    """Try regions, and divide those that do not hold as long as these are few or nearly do.
+def _refined(search: CopySearch, trial: Trial, most: float = _FEW) -> list[Trial]:
+    """Divide regions that do not hold, as long as these are few or nearly do.
 
     Few are those with up to some share of the area.
     """
     found: list[Trial] = []
-    while True:
-        number = before + len(found) + 1
-        search.settings.say(f"seams and shape, attempt {number}: {label.max() + 1} pieces")
-        found.append(search.measured(label))
-        trial = found[-1]
+    while len(found) < search.settings.effort.divisions:
         few = _failed(search, trial) <= most or trial.excess.max() <= _LITTLE
-        ends = trial.holds or _hopeless(trial) or not few
-        if ends or len(found) > search.settings.effort.divisions:
-            return found
+        if trial.holds or _hopeless(trial) or not few:
+            break
         label = search.smaller(trial, trial.of_regions())
         if np.array_equal(label, trial.label):
-            return found
+            break
+        search.settings.say(f"seams and shape: {label.max() + 1} pieces")
+        trial = search.measured(label)
+        found.append(trial)
+    return found
 
 
 def _failed(search: CopySearch, trial: Trial) -> float:
