@@ -129,7 +129,7 @@ class TestRegions:
 
 def skew_ball() -> Mesh:
     """A ball that is only symmetric from x to -x, with vertices that have no mirror images."""
-    side = 36
+    side = 33
     t = np.linspace(-1, 1, side)
     x, y = np.meshgrid(t + 0.15 * (1 - t * t), t, indexing="ij")
     x = x + 0.1 * (1 - x * x) * y
@@ -140,7 +140,7 @@ def skew_ball() -> Mesh:
 
 def searched(**options) -> Segmentation:
     """Pieces of the ball, at a first look."""
-    return gso.pieces(ball(36), max_deviation=0.03, effort="draft", workers=0, **options)
+    return gso.pieces(ball(32), max_deviation=0.05, effort="draft", workers=0, **options)
 
 
 @pytest.fixture(scope="module")
@@ -213,14 +213,14 @@ class TestTheSearch:
         height = (found.design.vertices - [0.3, 0, 0]) @ [1, 0.2, 0]
         given = found.given.vertices
         on = np.abs((given - [0.3, 0, 0]) @ [1, 0.2, 0]) < 1e-9
-        assert on.sum() > 30
+        assert on.sum() > 25
         seam = np.zeros(len(height), bool)
         seam[found.edges] = True
         rim = found.design.half_edges.boundary_vertex
         assert (seam | rim)[: len(given)][on].all()
 
     def test_seams_keep_away_from_faces(self, free):
-        middle = ball(36).vertices[ball(36).faces].mean(axis=1)
+        middle = ball(32).vertices[ball(32).faces].mean(axis=1)
         found = searched(avoid=np.hypot(middle[:, 0], middle[:, 1]) < 0.35)
         assert found.usable, found.reasons
         ends = found.design.vertices[found.edges].mean(axis=1)
