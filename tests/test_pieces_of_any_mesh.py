@@ -13,7 +13,7 @@ from gso import faults
 from gso.cli import main
 from gso.io import Unwelded
 from gso.mesh import Cut, Mesh
-from gso.seams import Edges, Pieces, turned_at_seams
+from gso.seams import Edges, Pieces, inverted_at_seams
 from gso.unfolding import manifold_mesh
 from gso.verdict import Code
 
@@ -271,7 +271,7 @@ class TestTurnedAtSeams:
         middle = pieces.of_face[
             np.abs(pieces.design.vertices[pieces.design.faces, 0] - 1.5).max(1) < 1
         ]
-        found = turned_at_seams(result)
+        found = inverted_at_seams(result)
         assert set(pieces.of_face[found].tolist()) == set(middle.tolist())
         assert len(found) == 12
 
@@ -288,7 +288,7 @@ class TestTurnedAtSeams:
 
     def test_a_sharp_edge_between_pieces_is_none(self):
         _, result = self.strips(np.array([0.0, 1.0, 2.0, 3.0]))
-        assert len(turned_at_seams(result)) == 0
+        assert len(inverted_at_seams(result)) == 0
         # The thin rim of a shell: both sheets keep their sides.
         opened, design = result.pieces.opened, result.pieces.design
         x = np.abs(opened.mesh.vertices[:, 0] - 1.0)
@@ -303,4 +303,4 @@ class TestTurnedAtSeams:
             pieces=Pieces(design.replaced(whole), opened),
         )
         assert len(faults.folded(sharp.pieces.design)) == 12
-        assert len(turned_at_seams(sharp)) == 0
+        assert len(inverted_at_seams(sharp)) == 0

@@ -75,27 +75,6 @@ def parts_of(mesh: Mesh, edges: Ints, shares: Array) -> tuple[Mesh, Ints]:
     return Mesh(with_points(v, edges, shares), faces, attributes=said), owner
 
 
-def lines_through(lines: Ints, edges: Ints, count: int) -> Ints:
-    """Return lines (l, 2) of a mesh of `count` vertices after :func:`divided`, as edges of it.
-
-    >>> lines = np.array([[0, 1], [4, 3], [1, 2]])
-    >>> lines_through(lines, np.array([[3, 4], [0, 1], [5, 6]]), 7).tolist()
-    [[0, 8], [8, 1], [4, 7], [7, 3], [1, 2]]
-    """
-    if not len(lines) or not len(edges):
-        return lines
-    total = count + len(edges)
-    keys = pair_keys(edges, total)
-    order = np.argsort(keys)
-    place = np.minimum(np.searchsorted(keys[order], pair_keys(lines, total)), len(keys) - 1)
-    new = count + order[place]
-    cut = keys[order][place] == pair_keys(lines, total)
-    first = np.stack([lines[:, 0], np.where(cut, new, lines[:, 1])], axis=1)
-    second = np.stack([new, lines[:, 1]], axis=1)[cut]
-    at = np.flatnonzero(cut) + 1
-    return np.asarray(np.insert(first, at, second, axis=0))
-
-
 def with_points(points: Array, edges: Ints, shares: Array) -> Array:
     """Return points (n + k, 3) with one on each of some edges (k, 2) between them."""
     a, b = points[edges[:, 0]], points[edges[:, 1]]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gso.geometry.plane import Plane
 from gso.typing import Array, Ints
 
 #: Distance of a mirrored point from its partner, relative to the diagonal.
@@ -13,15 +14,8 @@ _TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
-class Mirror:
-    """The plane of the points x with ``normal . x = offset``, and the reflection at it."""
-
-    normal: Array
-    offset: float
-
-    def image(self, points: Array) -> Array:
-        """Return reflected points (k, 3)."""
-        return points - 2.0 * np.outer(points @ self.normal - self.offset, self.normal)
+class Mirror(Plane):
+    """A plane of symmetry of strips."""
 
     def partners(self, points: Array) -> Ints | None:
         """Return the point that each point (k, 3) is the image of; None if there is none."""
@@ -34,7 +28,7 @@ class Mirror:
     def even_step(self, step: Array, partners: Ints) -> Array:
         """Return the means of displacements (k, 3) and the images of those of their partners."""
         other = step[partners]
-        return np.asarray(0.5 * (step + other - 2.0 * np.outer(other @ self.normal, self.normal)))
+        return np.asarray(0.5 * (step + self.image_of_vectors(other)))
 
     def arranged(self, index: Ints, points: Array) -> Array:
         """Move the ends of a sequence of rulings to the nearest symmetric places.

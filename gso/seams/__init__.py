@@ -19,11 +19,11 @@ from gso.seams.polyline_seam import Polyline
 if TYPE_CHECKING:
     from gso.seams.coarse_copy import CoarseCopy
     from gso.seams.disks import opening
+    from gso.seams.inverted_faces import inverted_at_seams
     from gso.seams.regions import Regions
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
-    from gso.seams.turned_faces import turned_at_seams
 
 __all__ = [
     "CoarseCopy",
@@ -41,10 +41,10 @@ __all__ = [
     "Sheet",
     "Slice",
     "cut",
+    "inverted_at_seams",
     "opening",
     "pieces",
     "rectangle",
-    "turned_at_seams",
 ]
 
 # These import SciPy.
@@ -55,7 +55,7 @@ __getattr__, __dir__ = at_first_use(
         "disks": "opening",
         "regions": "Regions",
         "search": "pieces",
-        "turned_faces": "turned_at_seams",
+        "inverted_faces": "inverted_at_seams",
         "segmentation": "Segmentation",
         "sheets": "Sheet",
     },

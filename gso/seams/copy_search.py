@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gso.cut_pieces import Pieces
+from gso.geometry.plane import Plane
 from gso.mesh.topology import edge_keys, pair_keys
 from gso.seams.candidates import disks
 from gso.seams.carrying import base_fields
@@ -20,7 +21,7 @@ from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
 from gso.seams.potential import Potential
 from gso.seams.regions import Divided, Regions, numbered
-from gso.seams.symmetry import Mirror, Plane
+from gso.seams.symmetry import Mirror
 from gso.seams.tree import Ground
 from gso.seams.trial import Allowed, Trial, tried
 from gso.typing import Array, Flags, Ints

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.errors import OptionError
+from gso.geometry.plane import Plane
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
 from gso.typing import Array, Ints
@@ -67,6 +68,5 @@ def mirror_of(mesh: Mesh) -> Ints:
 def _partners(points: Array, normal: Array) -> tuple[Ints, float]:
     from scipy.spatial import cKDTree
 
-    mirrored = points - 2.0 * np.outer(points @ normal, normal)
-    away, partner = cKDTree(points).query(mirrored)
+    away, partner = cKDTree(points).query(Plane(normal, 0.0).image(points))
     return partner.astype(np.int64), float(away.max())

@@ -21,7 +21,7 @@ from gso import geometry
 from gso.linalg import spd
 from gso.mesh import Cut, Mesh
 from gso.mesh.cut import cut
-from gso.mesh.slicing import lines_through, parts_of, with_points
+from gso.mesh.slicing import followed, parts_of, with_points
 from gso.mesh.topology import edge_keys, label_components, pair_keys
 from gso.seams.potential import Potential
 from gso.typing import Array, Flags, Ints
@@ -65,7 +65,7 @@ class Divided(NamedTuple):
 
     def lines(self, lines: Ints) -> Ints:
         """Return edges for lines (k, 2) of the mesh that was divided."""
-        return lines_through(lines, self.ends, len(self.mesh.vertices) - len(self.ends))
+        return followed(lines, self.ends, len(self.mesh.vertices) - len(self.ends))
 
 
 @dataclass(frozen=True, eq=False)

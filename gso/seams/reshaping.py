@@ -10,6 +10,7 @@ import numpy as np
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
+from gso.geometry.plane import Plane
 from gso.mesh import Mesh
 from gso.pipeline import strains_of
 from gso.result import Result
@@ -19,7 +20,6 @@ from gso.seams.joint_solve import solve_pieces
 from gso.seams.options import PieceSettings
 from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
-from gso.seams.symmetry import Plane
 from gso.seams.tree import Ground
 from gso.seams.wanted import Wanted
 from gso.tasks.developable import Options
@@ -69,7 +69,7 @@ def reshaped(
         Plane of symmetry of the seams, for designs :func:`at_scale`.
     """
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
-    if at_scale(ground.mesh) and ground.mirror is None:
+    if at_scale(ground.mesh, settings.max_deviation) and ground.mirror is None:
         trial = divided_within(ground.mesh, settings, Wanted.of(ground), plane)
         return _patterns(ground, trial.shape, settings), trial.result
     tried: list[_Attempt] = []
@@ -90,9 +90,12 @@ def reshaped(
     return _patterns(ground, best.pieces, settings), best.result
 
 
-def at_scale(mesh: Mesh) -> bool:
-    """Whether the search runs on a copy at the scale of the distance, which coarse designs are."""
-    return mesh.is_triangles and int(mesh.used.sum()) >= _MANY
+def at_scale(mesh: Mesh, distance: float | None) -> bool:
+    """Whether the search runs on a copy at the scale of a distance, if there is one.
+
+    Coarse designs are at that scale.
+    """
+    return distance is not None and mesh.is_triangles and int(mesh.used.sum()) >= _MANY
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso.geometry.plane import Plane
 from gso.mesh import Mesh
 from gso.seams.budgets import Budgets
 from gso.seams.carrying import base_start
@@ -20,7 +21,7 @@ from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.region_merges import Merges
-from gso.seams.symmetry import Plane, symmetric_points
+from gso.seams.symmetry import symmetric_points
 from gso.seams.trial import Allowed, Trial, tried
 from gso.seams.wanted import Wanted
 from gso.typing import Flags, Ints

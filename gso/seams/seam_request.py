@@ -64,8 +64,8 @@ class SeamRequest:
         given = {"symmetric": self.symmetric, "along": len(self.along), "avoid": len(self.avoid)}
         return tuple(name for name, value in given.items() if value)
 
-    def searched(self, design: Mesh, allowed: float | None) -> Mesh:
-        """Return the mesh to search: triangles, whose seams need not follow edge rows.
+    def check_symmetric(self, design: Mesh, allowed: float | None) -> None:
+        """Raise an error if seams are to be symmetric, and the design is not.
 
         Parameters
         ----------
@@ -76,22 +76,36 @@ class SeamRequest:
         Raises
         ------
         OptionError
-            Seams are to be symmetric, and the design is not. Where it has to be so vertex by
-            vertex, the triangles of quads are not, so that quads are kept.
+            It is not.
         """
-        # These import SciPy.
-        from gso.seams.reshaping import at_scale
+        if not self.symmetric:
+            return
+        # This imports SciPy.
         from gso.seams.symmetry import plane_of
 
+        mesh = self.searched(design, allowed)
+        if self._at_scale(mesh, allowed):
+            plane_of(mesh)
+        else:
+            mirror_of(mesh)
+
+    def searched(self, design: Mesh, allowed: float | None) -> Mesh:
+        """Return the mesh to search: triangles, whose seams need not follow edge rows.
+
+        Where a design has to be symmetric vertex by vertex, the triangles of quads are not, so that
+        quads are kept.
+        """
         triangles = design
         if not design.is_triangles:
             triangles = Mesh(design.vertices, design.triangles)
-        if self.symmetric and allowed is not None and at_scale(triangles):
-            plane_of(triangles)
-        elif self.symmetric:
-            mirror_of(design)
-            return design
-        return triangles
+        return design if self.symmetric and not self._at_scale(triangles, allowed) else triangles
+
+    @staticmethod
+    def _at_scale(mesh: Mesh, allowed: float | None) -> bool:
+        # This imports SciPy.
+        from gso.seams.reshaping import at_scale
+
+        return at_scale(mesh, allowed)
 
     def keywords(self, design: Mesh, mesh: Mesh) -> Keywords:
         """Return keywords of :func:`gso.pieces` for a mesh on the vertices of the design."""

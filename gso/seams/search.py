@@ -249,7 +249,7 @@ def _searched(
     workers: int | None,
 ) -> Segmentation:
     """Search for seams, and judge the pieces."""
-    scaled = settings.max_deviation is not None and at_scale(design)
+    scaled = at_scale(design, settings.max_deviation)
     plane = plane_of(design) if symmetric and scaled else None
     mirror = mirror_of(design) if symmetric and not scaled else None
     ground = Ground.of(design, factor, kept, mirror)

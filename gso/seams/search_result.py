@@ -14,9 +14,9 @@ from gso.mesh import Mesh
 from gso.result import Result
 from gso.seams.candidates import Candidate
 from gso.seams.facets import FACETS, mean_angle
+from gso.seams.inverted_faces import inverted_at_seams
 from gso.seams.options import NECK, PieceSettings
 from gso.seams.segmentation import Segmentation
-from gso.seams.turned_faces import turned_at_seams
 from gso.typing import Ints
 from gso.verdict import Code, Measurement, compare
 from gso.verdict.surface_checks import crossed, of_surface
@@ -76,7 +76,7 @@ def packed(
     else:
         # Both sides of a seam touch, which is no crossing where they are sewn.
         faulty = of_surface(result.design, result.mesh) | crossed(own.design)
-        over = np.empty(0, np.int64) if result.pieces is None else turned_at_seams(result)
+        over = np.empty(0, np.int64) if result.pieces is None else inverted_at_seams(result)
         if len(over) and not faulty[Code.FOLDED].value:
             faulty[Code.FOLDED] = Measurement.count("face", over)
         if own.design.is_triangles and not faulty[Code.CROSSES_ITSELF].value:

@@ -80,6 +80,14 @@ class Segmentation(Pieces):
         return Pattern(flat, opened.mesh.faces, opened.vertex, opened.seams)
 
     @property
+    def unchanged(self) -> Mesh:
+        """The design with the vertices on seams, before its shape changed."""
+        points = self.design.vertices.copy()
+        if self.result is not None and self.result.pieces is not None:
+            points[self.result.pieces.opened.vertex] = self.result.design.vertices
+        return self.design.replaced(points)
+
+    @property
     def folded(self) -> Folded:
         """The edges of :attr:`pattern` to bend along, where the design is kept as it is."""
         some = [

@@ -99,14 +99,22 @@ class Sheet:
         return min(float(away[i, j][real].min(initial=np.inf)), limit)
 
 
+def laid(mesh: Mesh, formulation: str = "strain") -> Sheet | None:
+    """Lay a disk flat by a formulation of the flatten task; None where that fails."""
+    pattern = lay_out(mesh, formulation=formulation)
+    if pattern is None or pattern.is_cut or not np.isfinite(pattern.flat).all():
+        return None
+    return Sheet(mesh, pattern.flat)
+
+
 def flattened(mesh: Mesh) -> Sheet | None:
     """Lay a disk flat with the least largest strain; None where that fails."""
     found: list[Sheet] = []
     for formulation in ("minimax", "strain"):
-        pattern = lay_out(mesh, formulation=formulation)
-        if pattern is None or pattern.is_cut or not np.isfinite(pattern.flat).all():
+        sheet = laid(mesh, formulation)
+        if sheet is None:
             continue
-        found.append(Sheet(mesh, pattern.flat))
+        found.append(sheet)
         if found[0].strain > _ISOMETRIC:
             break
     return min(found, key=lambda sheet: sheet.strain, default=None)

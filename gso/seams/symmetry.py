@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from gso import geometry
 from gso.errors import OptionError
+from gso.geometry.plane import Plane
 from gso.mesh import Mesh, Nearest
 from gso.mesh.separation import centres
 from gso.mesh.topology import label_components
@@ -30,22 +31,6 @@ _LARGEST, _QUANTILE = 0.01, 0.98
 _POINTS, _STEPS = 2000, 8
 #: How far points next to creases are moved into their faces.
 _INSIDE = 0.05
-
-
-@dataclass(frozen=True)
-class Plane:
-    """A plane of symmetry: points x with ``normal @ x == offset``."""
-
-    normal: Array
-    offset: float
-
-    def height(self, points: Array) -> Array:
-        """Return the signed distances of points (n, 3)."""
-        return np.asarray(points @ self.normal - self.offset)
-
-    def mirrored(self, points: Array) -> Array:
-        """Return the mirror images of points (n, 3)."""
-        return np.asarray(points - 2.0 * np.outer(self.height(points), self.normal))
 
 
 def plane_of(mesh: Mesh) -> Plane:
@@ -78,8 +63,8 @@ def plane_of(mesh: Mesh) -> Plane:
     for normal in directions(axes):
         plane = Plane(normal, float(normal @ centroid))
         for _ in range(_STEPS):
-            plane = _moved(plane, some, near.locate(plane.mirrored(some))[2])
-        away = float(np.quantile(near.distances(plane.mirrored(some)), _QUANTILE))
+            plane = _moved(plane, some, near.locate(plane.image(some))[2])
+        away = float(np.quantile(near.distances(plane.image(some)), _QUANTILE))
         if away < least:
             best, least = plane, away
     if best is None or least > _LARGEST * mesh.diagonal:
@@ -103,9 +88,8 @@ def _moved(plane: Plane, points: Array, images: Array) -> Plane:
 def symmetric_points(mesh: Mesh, points: Array, plane: Plane) -> Array:
     """Return points (n, 3) for a mesh, displaced by the mean of both halves."""
     moved = points - mesh.vertices
-    face, share, _ = Nearest(mesh).locate(plane.mirrored(mesh.vertices))
-    image = np.einsum("nk,nkd->nd", share, moved[mesh.faces[face]])
-    image -= 2.0 * np.outer(image @ plane.normal, plane.normal)
+    face, share, _ = Nearest(mesh).locate(plane.image(mesh.vertices))
+    image = plane.image_of_vectors(np.einsum("nk,nkd->nd", share, moved[mesh.faces[face]]))
     return np.asarray(mesh.vertices + 0.5 * (moved + image))
 
 
@@ -135,7 +119,7 @@ class Mirror:
         for side in (half, ~half):
             goal = np.flatnonzero(~side)
             if len(goal) and side.any():
-                found = cKDTree(middle[goal]).query(self.plane.mirrored(middle[side]))[1]
+                found = cKDTree(middle[goal]).query(self.plane.image(middle[side]))[1]
                 out[side] = goal[found]
         return out
 
@@ -149,7 +133,7 @@ class Mirror:
         number = np.maximum(np.bincount(corners.ravel(), minlength=count), 1)
         inner = [np.bincount(corners.ravel(), x, count) / number for x in middle.T]
         points = (1.0 - _INSIDE) * opened.vertices + _INSIDE * np.stack(inner, axis=1)
-        face, share, _ = Nearest(mesh).locate(self.plane.mirrored(points))
+        face, share, _ = Nearest(mesh).locate(self.plane.image(points))
         rows = np.repeat(np.arange(count), 3)
         return csr_matrix((share.ravel(), (rows, corners[face].ravel())), (count, count))
 

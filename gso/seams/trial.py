@@ -13,14 +13,14 @@ from gso.errors import MeshError
 from gso.executors import SERIAL, Executor
 from gso.mesh import Mesh, Nearest
 from gso.mesh.topology import edge_keys, neighbour_means, pair_keys
-from gso.pipeline import lay_out
 from gso.result import Result
+from gso.seams.candidates import Candidate
 from gso.seams.cutting import cut
+from gso.seams.inverted_faces import inverted_at_seams
 from gso.seams.joint_solve import solve_pieces
 from gso.seams.kinds import Edges
 from gso.seams.regions import Divided, with_flips
-from gso.seams.sheets import Sheet
-from gso.seams.turned_faces import turned_at_seams
+from gso.seams.sheets import Sheet, laid
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
@@ -109,7 +109,7 @@ class Trial:
         found = np.setdiff1d(faults.folded(self.shape.opened.mesh), before)
         if self.result is None or self.result.pieces is None:
             return found
-        return np.union1d(found, turned_at_seams(self.result))
+        return np.union1d(found, inverted_at_seams(self.result))
 
     @cached_property
     def folds(self) -> Ints:
@@ -143,7 +143,7 @@ class Trial:
 
     def necks(self, limit: float) -> Array:
         """Return the width of each piece's narrowest place, or a limit where that is less."""
-        return np.array([limit if sheet is None else sheet.neck(limit) for sheet in self.sheets])
+        return Candidate(self.shape, self.sheets).necks(limit)
 
     @property
     def shape(self) -> Pieces:
@@ -269,7 +269,7 @@ def _measured(
     # Flips change the areas of pieces, and so perhaps their order.
     region = divided.label[[part.faces[0] for part in pieces.parts]]
     shape = _solved(pieces, result)
-    sheets = tuple(executor.map(_laid, [part.mesh for part in shape.parts]))
+    sheets = tuple(executor.map(laid, [part.mesh for part in shape.parts]))
     strain = np.array([np.inf if one is None else one.strain for one in sheets]) / allowed.strain
     far = _away(shape, allowed)
     return Trial(label, pieces, region, result, sheets, far, strain, width, options)
@@ -333,11 +333,3 @@ def _untangled(trial: Trial) -> Array:
         moved[seam] = (along @ points)[seam]
         points = 0.5 * (points + moved)
     return np.asarray(points)
-
-
-def _laid(mesh: Mesh) -> Sheet | None:
-    """Lay a piece flat; None where that fails."""
-    pattern = lay_out(mesh)
-    if pattern is None or pattern.is_cut or not np.isfinite(pattern.flat).all():
-        return None
-    return Sheet(mesh, pattern.flat)

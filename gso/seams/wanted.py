@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.mesh import Mesh
-from gso.mesh.slicing import lines_through
+from gso.mesh.slicing import followed
 from gso.seams.tree import Ground
 from gso.typing import Flags, Ints
 
@@ -54,6 +54,6 @@ class Wanted:
 
     def through(self, edges: Ints, count: int) -> Wanted:
         """Return the same for a mesh of `count` vertices with one more on each of some edges."""
-        kept, along = (lines_through(own, edges, count) for own in self.lines)
+        kept, along = (followed(own, edges, count) for own in self.lines)
         more = self.avoided[edges].all(axis=1)
         return Wanted(kept, along, np.concatenate([self.avoided, more]))

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from gso.constraints import FixedBoundary, SlidingBoundary, compile_constraints
-from gso.cut_pieces import Pieces
 from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.seams import Edges, Segmentation, cut
@@ -73,7 +72,7 @@ def solved(
     allowed : float
         Largest distance from the design.
     """
-    division = _of_design(found)
+    division = cut(found.unchanged, Edges(np.asarray(found.edges)))
     request = check(
         "developable",
         max_deviation=allowed,
@@ -105,11 +104,3 @@ def solved(
     if holds(given, shape.design):
         return out
     return replace(out, reasons=merge(out.reasons, (failure(Code.CONSTRAINTS_MISSED),)))
-
-
-def _of_design(found: Segmentation) -> Pieces:
-    """Return the pieces as parts of the design as it was given, before its shape changed."""
-    points = found.design.vertices.copy()
-    if found.result is not None and found.result.pieces is not None:
-        points[found.result.pieces.opened.vertex] = found.result.design.vertices
-    return cut(found.design.replaced(points), Edges(np.asarray(found.edges)))

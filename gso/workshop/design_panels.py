@@ -267,7 +267,7 @@ def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int
         named=given.is_marked or bool(asked.preferences),
     )
     # Seams of a design that is not symmetric are not symmetric: nothing else will do.
-    asked.searched(light.mesh, light.allowed)
+    asked.check_symmetric(light.mesh, light.allowed)
     tried = []
     if not len(given.kept) and parametrization.flattens(light.mesh):
         say("as a whole")

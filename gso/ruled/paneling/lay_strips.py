@@ -340,7 +340,7 @@ class _Task:
         failed: GSOError | None = None
         if self.division is None:
             # Seams of a design that is not symmetric are not symmetric: nothing else will do.
-            asked.seams.searched(light.mesh, light.allowed)
+            asked.seams.check_symmetric(light.mesh, light.allowed)
         for division in self._divisions(light):
             try:
                 tried.append(self._in_pieces(light, division()))
@@ -571,10 +571,7 @@ def _is_whole(mesh: Mesh) -> bool:
 
 def _without_darts(found: Segmentation) -> Pieces:
     """Return pieces of the design as it was given, without darts where that leaves disks."""
-    points = found.design.vertices.copy()
-    if found.result is not None and found.result.pieces is not None:
-        points[found.result.pieces.opened.vertex] = found.result.design.vertices
-    design, sides = found.design.replaced(points), found.sides
+    design, sides = found.unchanged, found.sides
     pieces = cut(design, Edges(found.edges[sides[:, 0] != sides[:, 1]]))
     # A seam within a piece may open a ring or a handle.
     whole = len(pieces) == 1 or all(piece.is_disk for piece in pieces)

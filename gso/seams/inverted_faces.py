@@ -1,4 +1,4 @@
-"""Faces that turn over beside a seam, which is no fold of one piece."""
+"""Faces that are inverted beside a seam, which is no fold of one piece."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from gso.result import Result
 from gso.typing import Ints
 
 
-def turned_at_seams(result: Result) -> Ints:
-    """Return the faces that have turned over, and at a seam lie on the neighbouring piece.
+def inverted_at_seams(result: Result) -> Ints:
+    """Return the faces with reversed normals that at a seam lie on the neighbouring piece.
 
     A sharp edge between two pieces alone is no fold, such as the rim of a thin shell.
 
