@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gso import geometry
 from gso.cut_pieces import Pieces
 from gso.geometry.plane import Plane
 from gso.mesh.topology import edge_keys, pair_keys
@@ -49,6 +50,8 @@ _TINY = 0.003
 _FINER = 200
 #: Share of faces that seams should avoid from which on these regions are divided all the same.
 _HALF = 0.5
+#: Iterations of a solve that begins with the shape of another.
+_ITERATIONS = 12
 #: How often pieces that nearly hold are solved again.
 _REPAIRS = 2
 
@@ -75,7 +78,8 @@ class CopySearch:
     @cached_property
     def of_copy(self) -> Allowed:
         """What pieces of the copy may use."""
-        return replace(self.allowed, design=self.copy.mesh, distance=_ROOM * self.allowed.distance)
+        distance = _ROOM * self.allowed.distance
+        return replace(self.allowed, design=self.copy.mesh, distance=distance, built=False)
 
     @cached_property
     def beside(self) -> tuple[Ints, Array]:
@@ -205,8 +209,17 @@ class CopySearch:
             else:
                 return label
 
-    def measured(self, label: Ints, width: float | None = None, most: float = np.inf) -> Trial:
-        """Solve and measure regions of the copy; repair them up to some excess."""
+    def measured(
+        self,
+        label: Ints,
+        width: float | None = None,
+        most: float = np.inf,
+        begin: Trial | None = None,
+    ) -> Trial:
+        """Solve and measure regions of the copy; repair them up to some excess.
+
+        The solve may begin with the shape of another trial.
+        """
         regions, width = self.regions, self.width if width is None else width
         fields = regions.fields(label, width)
         if self.mirror is not None:
@@ -217,6 +230,8 @@ class CopySearch:
             divided,
             self.opened(divided, self.copy.wanted_of_copy.kept, self.apexes),
             self.of_copy,
+            None if begin is None else divided.moved(begin.untangled[: len(regions.mesh.vertices)]),
+            _ITERATIONS,
             repairs=_REPAIRS,
             executor=self.settings.executor,
             width=width,
@@ -294,7 +309,26 @@ class CopySearch:
             ground = Ground.of(mesh, kept=ground.kept)
             regions = Regions(mesh, self.copy.lines)
         new = self.merged(start, level, _COMPACT[0], ground)
+        new = self._sides(label, new, trial.folds_only)
         return self.alike(self.without_small(regions.fair(new, self.width, rounds=1)))
+
+    def _sides(self, label: Ints, new: Ints, some: Flags) -> Ints:
+        """Divide some regions (k,) at the silhouette of what sticks out, such as a fin or an ear.
+
+        There a developable piece around both sides is folded. The sides are those by the normals of
+        faces, in the direction in which these differ most. Other faces keep their new region.
+        """
+        vectors = geometry.area_vectors(self.copy.mesh.vertices, self.copy.mesh.faces)
+        for own in np.flatnonzero(some):
+            inside = label == own
+            size = np.linalg.norm(vectors[inside], axis=1)
+            normal = vectors[inside] / np.maximum(size, 1e-300)[:, None]
+            mean = size @ normal / size.sum()
+            spread = (normal - mean).T @ (size[:, None] * (normal - mean))
+            side = (normal - mean) @ np.linalg.eigh(spread)[1][:, -1] > 0.0
+            new = new.copy()
+            new[inside] = int(new.max()) + 1 + side
+        return numbered(new)
 
     def alike(self, label: Ints) -> Ints:
         """Make regions symmetric if they are to be."""

@@ -9,6 +9,8 @@ triangles, and its pieces are solved from the shape of the copy.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gso.geometry.plane import Plane
@@ -134,7 +136,7 @@ def _refined(search: CopySearch, trial: Trial, most: float = _FEW) -> list[Trial
         if np.array_equal(label, trial.label):
             break
         search.settings.say(f"seams and shape: {label.max() + 1} pieces")
-        trial = search.measured(label)
+        trial = search.measured(label, begin=trial)
         found.append(trial)
     return found
 
@@ -165,33 +167,42 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
     settings = search.settings
     found: list[Trial] = []
     trial, others = trials[-1], trials[:-1]
+    begin: Trial | None = None
     rounds = settings.effort.rounds
     for number in range(rounds):
         settings.say(f"the design's own pieces, attempt {number + 1}")
-        own = _carried(search, trial)
+        own = _carried(search, trial, begin)
         found.append(own)
         if own.holds or _hopeless(own) or number == rounds - 1:
             break
-        excess = np.maximum(own.of_regions(), trial.of_regions())
+        excess = own.of_regions(own.too_large)
         while others and _has(others[-1].label, trial.label, excess > 1.0):
             others.pop()
         if others:
-            trial = others.pop()
+            trial, begin = others.pop(), None
             continue
-        label = search.smaller(trial, excess)
-        if np.array_equal(label, trial.label):
+        # Parts that only pass through each other are solved again.
+        some = (excess > 1.0).any()
+        label = search.smaller(own, excess) if some else trial.label
+        if some and np.array_equal(label, trial.label):
             break
-        trial = search.measured(label, trial.width)
+        trial, begin = replace(trial, label=label), own
     return min(found, key=lambda one: _rank(one, settings))
 
 
-def _carried(search: CopySearch, trial: Trial) -> Trial:
-    """Carry the regions of a trial back to the design, and solve them."""
+def _carried(search: CopySearch, trial: Trial, begin: Trial | None) -> Trial:
+    """Carry the regions of a trial back to the design, and solve them.
+
+    The solve begins with the shape of the trial, or with that of an earlier one of the design.
+    """
     copy = search.copy
     fields = search.base_fields(trial.label, trial.width)
     divided = search.base_regions.cut_between(fields)
     smooth = search.opened(divided, copy.wanted.kept, search.base_apexes)
-    start = base_start(copy, trial, smooth)
+    if begin is None:
+        start = base_start(copy, trial, smooth)
+    else:
+        start = divided.moved(begin.untangled[: len(copy.base.vertices)])
     if search.plane is not None:
         start = symmetric_points(smooth.design, start, search.plane)
     design = smooth.design.replaced(divided.moved(copy.base.vertices))

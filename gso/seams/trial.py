@@ -15,6 +15,7 @@ from gso.mesh import Mesh, Nearest
 from gso.mesh.topology import edge_keys, neighbour_means, pair_keys
 from gso.result import Result
 from gso.seams.candidates import Candidate
+from gso.seams.corrections import Corrections
 from gso.seams.cutting import cut
 from gso.seams.inverted_faces import inverted_at_seams
 from gso.seams.joint_solve import solve_pieces
@@ -24,10 +25,12 @@ from gso.seams.sheets import Sheet, laid
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Share of the allowed distance beyond which the solver penalises it, and the weight of that.
 _REACH, _WEIGHT = 0.9, 5000.0
+#: Weight of a barrier against folds.
+_FACING = 0.05
 #: Factors on the weights of fairness, curvature and proximity of the joint solve.
 _FAIR, _CURVED, _NEAR = 3.0, 2.0, 0.3
 #: What a folded face adds to a piece's excess, and the exponent and largest value of that of the
@@ -36,11 +39,15 @@ _FOLD, _ROOT, _MOST = 0.02, 0.25, 2.5
 #: Largest distance, strain and number of folds (a share of the faces, and a number) of a result
 #: that is solved again with more weight on what is too large.
 _FAR, _STRAINED, _DOUBTFUL_FOLDS, _SOME_FOLDS = 1.6, 12.0, 0.03, 12
+#: Largest distance of a point of the design from such a result.
+_FARTHER = 2.5
 #: Largest strain where the shape to begin with is known to hold on a copy.
 _KNOWN = 200.0
 #: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
 #: rounds in which vertices of folds move between their neighbours.
 _BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (2.0, 6.0), 12, 10
+#: By how much points inside faces may be farther away than vertices.
+_INSIDE = 1.05
 #: Factor on the weight of distances beyond those that are aimed at, where they are too large.
 _NEARER = 2.0
 #: Range of the factor on the weight of fairness where faces are folded, and what each of them adds.
@@ -55,11 +62,15 @@ _DOUBTFUL = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Allowed:
-    """What pieces are measured by: largest distance from a design, and strain."""
+    """What pieces are measured by: largest distance from a design, and strain.
+
+    What is to be `built` does not pass through itself; a copy of the design may.
+    """
 
     design: Mesh
     distance: float
     strain: float
+    built: bool = True
 
     @cached_property
     def near(self) -> Nearest:
@@ -86,6 +97,10 @@ class Trial:
     distance, strain : ndarray, (p,)
         Largest distance of each piece from the design, and strain of its pattern, over what is
         allowed.
+    crossed : ndarray of int
+        Faces that pass through others, where the surface is to be built.
+    outward : float
+        Largest distance of a vertex from the design over the allowed one.
     width : float
         Of the diffusion that made the boundaries fair.
     options : Options
@@ -99,6 +114,8 @@ class Trial:
     sheets: tuple[Sheet | None, ...]
     distance: Array
     strain: Array
+    crossed: Ints
+    outward: float
     width: float
     options: Options
 
@@ -114,15 +131,25 @@ class Trial:
     @cached_property
     def folds(self) -> Ints:
         """Number of these of each piece (p,)."""
-        return np.bincount(self.shape.of_face[self.folded], minlength=len(self.region))
+        return self._number(self.folded)
+
+    def _number(self, faces: Ints) -> Ints:
+        """Count faces of each piece (p,)."""
+        return np.bincount(self.shape.of_face[faces], minlength=len(self.region))
 
     @cached_property
     def excess(self) -> Array:
         """What each piece (p,) needs over what is allowed: up to 1 it holds."""
+        crossed = self._number(self.crossed)
+        return np.maximum(self.too_large, np.where(crossed > 0, _faulty(crossed), 0.0))
+
+    @cached_property
+    def too_large(self) -> Array:
+        """What smaller pieces may need less of (p,), over what is allowed."""
         strain = np.where(
             self.strain > 1.0, np.minimum(np.maximum(self.strain, 1.0) ** _ROOT, _MOST), 0.0
         )
-        folds = np.where(self.folds > 0, np.minimum(1.0 + _FOLD * self.folds, _MOST), 0.0)
+        folds = np.where(self.folds > 0, _faulty(self.folds), 0.0)
         return np.asarray(np.max([self.distance, strain, folds], axis=0))
 
     @property
@@ -130,10 +157,23 @@ class Trial:
         """Whether all pieces hold what is allowed."""
         return bool((self.excess <= 1.0).all())
 
-    def of_regions(self) -> Array:
-        """Return the largest excess (k,) of the pieces of each region."""
+    @property
+    def folds_only(self) -> Flags:
+        """Whether each region (k,) has folds, and holds the distance."""
+        out = np.zeros((2, int(self.label.max()) + 1), bool)
+        np.logical_or.at(out[0], self.region, self.folds > 0)
+        np.logical_or.at(out[1], self.region, self.distance > 1.0)
+        return np.asarray(out[0] & ~out[1])
+
+    @cached_property
+    def untangled(self) -> Array:
+        """The solved points (n, 3), those of folded faces between their neighbours."""
+        return _untangled(self)
+
+    def of_regions(self, value: Array | None = None) -> Array:
+        """Return the largest excess, or other value, of the pieces of each region (k,)."""
         out = np.zeros(int(self.label.max()) + 1)
-        np.maximum.at(out, self.region, self.excess)
+        np.maximum.at(out, self.region, self.excess if value is None else value)
         return out
 
     @cached_property
@@ -151,6 +191,11 @@ class Trial:
         return _solved(self.pieces, self.result)
 
 
+def _faulty(number: Ints) -> Array:
+    """Return the excess of pieces with a number of faulty faces."""
+    return np.asarray(np.minimum(1.0 + _FOLD * number, _MOST))
+
+
 def _solved(pieces: Pieces, result: Result | None) -> Pieces:
     """Return pieces after a solve, if there was one."""
     return pieces if result is None or result.pieces is None else result.pieces
@@ -166,6 +211,7 @@ def options_for(distance: float) -> Options:
         w_proximity=_NEAR * own.w_proximity,
         reach=_REACH * distance,
         w_reach=_WEIGHT,
+        w_facing=_FACING,
     )
 
 
@@ -212,11 +258,14 @@ def tried(
     if options is not None:
         own = replace(options, reach=own.reach)
     found: list[Trial] = []
+    corrections = Corrections(pieces, allowed.distance)
+    if start is not None:
+        corrections.measure(pieces.design.replaced(start))
     for number in range(2 * repairs + 1):
         begin = Start(start, iterations=iterations if start is not None else None)
         asked = Request("developable", "curvature", own, start=begin, verdict=False)
         try:
-            result = solve_pieces(pieces, asked)
+            result = solve_pieces(pieces, asked, corrections.constraints)
         except MeshError:
             result = None
         trial = _measured(label, divided, pieces, result, allowed, executor, width, own)
@@ -228,7 +277,8 @@ def tried(
         if number >= repairs and max(trial.distance.max(), trial.strain.max()) > _CLOSE:
             break
         own = _stricter(own, trial)
-        start, iterations = _untangled(trial), _AGAIN
+        corrections.measure(trial.shape.design)
+        start, iterations = trial.untangled, _AGAIN
         pieces = _with_flips(trial)
     return min(found, key=lambda one: float(one.excess.max()))
 
@@ -238,13 +288,20 @@ def _repairable(trial: Trial, known: bool) -> bool:
     far, strain = float(trial.distance.max()), float(trial.strain.max())
     folds = int(trial.folds.sum())
     most = _DOUBTFUL_FOLDS * len(trial.pieces.design.faces) + _SOME_FOLDS
-    return far <= _FAR and strain <= (_KNOWN if known or folds else _STRAINED) and folds <= most
+    return (
+        far <= _FARTHER
+        and trial.outward <= _FAR
+        and strain <= (_KNOWN if known or folds else _STRAINED)
+        and folds <= most
+    )
 
 
 def _stricter(options: Options, trial: Trial) -> Options:
     """Return settings with more weight on what is too large."""
     far, strain = float(trial.distance.max()), float(trial.strain.max())
     if far > 1.0 and options.reach is not None:
+        # Where only the design is far from the result, vertices are drawn (`Corrections`).
+        far = min(far, max(trial.outward, _INSIDE))
         reach, weight = options.reach * _BELOW / far, _NEARER * options.w_reach
         options = replace(options, reach=reach, w_reach=weight)
     if trial.folds.any():
@@ -271,14 +328,21 @@ def _measured(
     shape = _solved(pieces, result)
     sheets = tuple(executor.map(laid, [part.mesh for part in shape.parts]))
     strain = np.array([np.inf if one is None else one.strain for one in sheets]) / allowed.strain
-    far = _away(shape, allowed)
-    return Trial(label, pieces, region, result, sheets, far, strain, width, options)
+    far, outward = _away(shape, allowed)
+    crossed = np.unique(faults.crossings(shape.design)) if allowed.built else np.empty(0, np.int64)
+    return Trial(
+        label, pieces, region, result, sheets, far, strain, crossed, outward, width, options
+    )
 
 
-def _away(shape: Pieces, allowed: Allowed) -> Array:
-    """Return the largest distance of each piece (p,) from the design over the allowed one."""
+def _away(shape: Pieces, allowed: Allowed) -> tuple[Array, float]:
+    """Return the largest distance of each piece (p,) from the design over the allowed one.
+
+    Also return that of any vertex from the design.
+    """
     design, near, most = allowed.design, allowed.near, allowed.distance
     distance = np.array([float(near.distances(p.mesh.vertices).max()) for p in shape.parts])
+    outward = float(distance.max()) / most
     # And back: from the design to the nearest piece.
     face, away = Nearest(shape.design).nearest(design.vertices[design.used])
     np.maximum.at(distance, shape.of_face[face], away)
@@ -286,7 +350,7 @@ def _away(shape: Pieces, allowed: Allowed) -> Array:
         # Points inside faces may be farther away than all vertices.
         largest = metrics.largest_distance(design, shape.design)
         distance[distance.argmax()] = max(largest, float(distance.max()))
-    return np.asarray(distance / most)
+    return np.asarray(distance / most), outward
 
 
 def _with_flips(trial: Trial) -> Pieces:

@@ -29,12 +29,14 @@ from gso.energy import (
     Weighted,
     curvature,
     elongation,
+    facing,
     fairness,
     gauss_image,
     holonomy,
     proximity,
     reach,
 )
+from gso.energy.base import Term
 from gso.energy.losses import Absolute, Beyond, Distance
 from gso.geometry import area_vectors
 from gso.hierarchy import resample
@@ -64,8 +66,11 @@ _QUADS = 2.0
 #: Radii of balls over the reach, the distance of their centres from the surface over the radius
 #: from which on they count as empty, the reach over the radius, the least reach of a vertex, and
 #: the cosine of the angle between normals of both sides.
-_RADII, _EMPTY, _OF_RADIUS, _THINNEST = (0.5, 1.0, 1.5, 2.0), 0.85, 0.5, 0.2
+_RADII, _EMPTY, _OF_RADIUS, _THINNEST = (0.15, 0.3, 0.5, 1.0, 1.5, 2.0), 0.85, 0.5, 0.05
 _OPPOSITE = -0.5
+#: Area of a triangle seen along its normal in the design, over its area there, below which it may be
+#: about to fold.
+_FACING = 0.15
 #: Defect in degrees up to which an inner outline counts as a hole, as where patterns are cut open;
 #: others are the ends of tubes. And the defect up to which a hole lacks no angle.
 _HOLE, _LACKS = 90.0, 0.1
@@ -145,8 +150,19 @@ def _terms(
         limits = _limits(mesh, normals, o.reach)
         far = reach.build(mesh, normals, limits, _rim(mesh))
         items.append(Weighted(far, o.w_reach, Beyond(1.0)))
+    if o.w_facing > 0.0:
+        items.append(Weighted(_facing(mesh), o.w_facing))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
     return items
+
+
+def _facing(mesh: Mesh) -> Term:
+    """Build the barrier against triangles that turn away from those of the design."""
+    vectors = area_vectors(mesh.vertices, mesh.triangles)
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    directions = vectors / np.maximum(size, 1e-300) ** 2
+    weights = np.full(len(directions), 1.0 / len(directions))
+    return facing.build(mesh.triangles, directions, weights, least=_FACING)
 
 
 def _limits(mesh: Mesh, normals: Array, most: float) -> Array:
@@ -155,13 +171,13 @@ def _limits(mesh: Mesh, normals: Array, most: float) -> Array:
     There a ball that touches the surface at the vertex contains points of the other side.
     """
     near, out = Nearest(mesh), np.full(len(mesh.vertices), _THINNEST)
-    facing = area_vectors(mesh.vertices, mesh.triangles)
-    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    towards = area_vectors(mesh.vertices, mesh.triangles)
+    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-300)
     for radius in _RADII:
         empty = np.ones(len(out), bool)
         for side in (-radius, radius):
             triangle, away = near.nearest(mesh.vertices + side * most * normals)
-            other = np.einsum("nd,nd->n", facing[triangle], normals) < _OPPOSITE
+            other = np.einsum("nd,nd->n", towards[triangle], normals) < _OPPOSITE
             empty &= (away >= _EMPTY * radius * most) | ~other
         out = np.maximum(out, np.where(empty, _OF_RADIUS * radius, 0.0))
     return np.asarray(most * np.minimum(out, 1.0))

@@ -42,6 +42,8 @@ class Options(BaseOptions):
         are then weighed as for the whole mesh.
     w_reach : float
         Weight of that.
+    w_facing : float
+        Weight of a barrier against triangles that turn away from those of the design.
     w_elongation : float
         Weight of edges much shorter or longer than in the design. Boundary edges are penalised
         from a change of length of 8 % on.
@@ -116,6 +118,7 @@ class Options(BaseOptions):
     w_proximity: float = 1.0
     reach: float | None = None
     w_reach: float = 100.0
+    w_facing: float = 0.0
     w_elongation: float = 0.1
     quadratic_below: float = 0.006
     tangential: float = 0.5
