@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse.csgraph import dijkstra
 
 from gso.mesh import Mesh
-from gso.mesh.topology import label_components
+from gso.mesh.topology import edge_graph, label_components, pair_keys
 from gso.seams.kinds import Creases
 from gso.typing import Ints
 
-#: Angle between faces, in degrees, from which on an edge is a crease.
-_ANGLE = 35.0
+#: Angle between faces, in degrees, from which on an edge is a crease, and from which on it may
+#: bridge a gap: where a mesh does not follow a crease, two rows of edges share its angle.
+_ANGLE, _WEAK = 35.0, 15.0
+#: Longest gap over the least length of a crease.
+_GAP = 0.75
 #: Share of the length of all edges from which on creases are the facets of a coarse mesh, or noise.
 _MOST = 0.15
 
@@ -35,6 +39,36 @@ def crease_lines(mesh: Mesh, shortest: float) -> Ints:
     length = np.linalg.norm(np.diff(mesh.vertices[ends], axis=1)[:, 0], axis=1)
     if length.sum() > _MOST * mesh.edge_lengths[~mesh.boundary_edges].sum():
         return np.empty((0, 2), np.int64)
+    ends = np.concatenate([ends, _bridges(mesh, ends, _GAP * shortest)])
+    length = np.linalg.norm(np.diff(mesh.vertices[ends], axis=1)[:, 0], axis=1)
     label = label_components(len(mesh.vertices), ends[:, 0], ends[:, 1])[ends[:, 0]]
     long = np.bincount(label, length)[label] >= shortest
     return np.asarray(ends[long][np.lexsort(ends[long].T[::-1])])
+
+
+def _bridges(mesh: Mesh, creases: Ints, longest: float) -> Ints:
+    """Return weaker edges (k, 2) that join the ends of two creases (c, 2) by the shortest way."""
+    n = len(mesh.vertices)
+    ends = np.flatnonzero(np.bincount(creases.ravel(), minlength=n) == 1)
+    weak = np.sort(Creases(_WEAK).edges(mesh), axis=1)
+    weak = weak[~np.isin(pair_keys(weak, n), pair_keys(creases, n))]
+    if len(ends) < 2 or not len(weak):
+        return np.empty((0, 2), np.int64)
+    length = np.linalg.norm(np.diff(mesh.vertices[weak], axis=1)[:, 0], axis=1)
+    graph = edge_graph(n, weak[:, 0], weak[:, 1], length)
+    away, before = dijkstra(
+        graph, directed=False, indices=ends, limit=longest, return_predecessors=True
+    )
+    between = away[:, ends]
+    np.fill_diagonal(between, np.inf)
+    other = between.argmin(axis=1)
+    # Both are the nearest end of the other.
+    row = np.flatnonzero(np.isfinite(between.min(axis=1)) & (other[other] == np.arange(len(ends))))
+    at, found = ends[other[row]], []
+    while len(row):
+        last = before[row, at]
+        found.append(np.stack([last, at], axis=1))
+        goes_on = last != ends[row]
+        row, at = row[goes_on], last[goes_on]
+    steps = np.concatenate(found) if found else np.empty((0, 2), np.int64)
+    return np.unique(np.sort(steps, axis=1), axis=0)

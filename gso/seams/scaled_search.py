@@ -37,6 +37,8 @@ _NEARLY = 1.15
 _FAR, _ENOUGH = 2.0, 3
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
 _HOPELESS, _MANY = 20.0, 150
+#: Number of pieces that seams along the creases around each feature may cost.
+_FOR_CREASES = 2
 #: Iterations of the solve of the design, from the shape of the copy.
 _ITERATIONS = 16
 #: How often these are solved again where they nearly hold.
@@ -73,7 +75,25 @@ def divided_within(
     allowed = Allowed(design, settings.max_deviation, settings.max_strain)
     copy = CoarseCopy.of(design, allowed.distance, wanted)
     search = CopySearch(copy, allowed, settings, plane)
-    return _of_design(search, _of_copy(search))
+    return _of_design(*_along_creases(search, _of_copy(search)))
+
+
+def _along_creases(search: CopySearch, trials: list[Trial]) -> tuple[CopySearch, list[Trial]]:
+    """Search again for seams along the creases around features, and take these if that costs little.
+
+    Such a feature is a nose, for example.
+    """
+    best = trials[-1]
+    along, features = search.featured()
+    if not best.holds or not 0 < features <= len(best.pieces):
+        return search, trials
+    search.settings.say(f"seams along creases, around {features} features")
+    others = _of_copy(along)
+    more = len(others[-1].pieces) - len(best.pieces)
+    missing = [Budgets(some[-1], search.settings).missing for some in (others, trials)]
+    if others[-1].holds and more <= _FOR_CREASES * features and missing[0] <= missing[1]:
+        return along, others
+    return search, trials
 
 
 def _of_copy(search: CopySearch) -> list[Trial]:

@@ -133,6 +133,11 @@ class Trial:
         """Number of these of each piece (p,)."""
         return self._number(self.folded)
 
+    @cached_property
+    def overlaps(self) -> Ints:
+        """Number of pairs of faces that overlap in each pattern (p,)."""
+        return np.array([0 if one is None else len(one.overlaps) for one in self.sheets])
+
     def _number(self, faces: Ints) -> Ints:
         """Count faces of each piece (p,)."""
         return np.bincount(self.shape.of_face[faces], minlength=len(self.region))
@@ -150,7 +155,8 @@ class Trial:
             self.strain > 1.0, np.minimum(np.maximum(self.strain, 1.0) ** _ROOT, _MOST), 0.0
         )
         folds = np.where(self.folds > 0, _faulty(self.folds), 0.0)
-        return np.asarray(np.max([self.distance, strain, folds], axis=0))
+        overlaps = np.where(self.overlaps > 0, _faulty(self.overlaps), 0.0)
+        return np.asarray(np.max([self.distance, strain, folds, overlaps], axis=0))
 
     @property
     def holds(self) -> bool:

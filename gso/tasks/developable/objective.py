@@ -68,8 +68,8 @@ _QUADS = 2.0
 #: the cosine of the angle between normals of both sides.
 _RADII, _EMPTY, _OF_RADIUS, _THINNEST = (0.15, 0.3, 0.5, 1.0, 1.5, 2.0), 0.85, 0.5, 0.05
 _OPPOSITE = -0.5
-#: Area of a triangle seen along its normal in the design, over its area there, below which it may be
-#: about to fold.
+#: Area of a triangle seen along its normal in the design, over its area there, below which the
+#: barrier against folds acts.
 _FACING = 0.15
 #: Defect in degrees up to which an inner outline counts as a hole, as where patterns are cut open;
 #: others are the ends of tubes. And the defect up to which a hole lacks no angle.
