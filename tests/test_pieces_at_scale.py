@@ -7,7 +7,7 @@ import gso
 from gso import metrics
 from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
-from gso.seams import CoarseCopy, Creases, Regions, Segmentation, Slice
+from gso.seams import CoarseCopy, Creases, Regions, RemainingTime, Segmentation, Slice
 
 
 def ball(side: int) -> Mesh:
@@ -173,6 +173,28 @@ class TestNoise:
     def test_another_word_is_an_error(self):
         with pytest.raises(gso.OptionError, match="denoise is 'yes'"):
             gso.pieces(ball(8), denoise="yes")
+
+
+class TestTheRemainingTime:
+    def test_it_is_known_from_the_second_solve_on(self):
+        said, now = [], iter([0.0, 2.0, 5.0, 6.0])
+        remaining = RemainingTime(said.append, lambda: next(now))
+        remaining.begin("one", 1.0, 9.0)
+        assert said == ["one"]
+        # Two seconds a solve, and then 2.5.
+        remaining.begin("two", 1.0, 2.0)
+        remaining.begin("three", 1.0, 19.0)
+        remaining.begin("four", 3.0, 0.0)
+        assert said[1:] == [
+            f"{x}, about {n} s left" for x, n in (("two", 6), ("three", 50), ("four", 6))
+        ]
+
+    def test_a_search_says_it(self):
+        said = []
+        searched(callback=said.append)
+        left = [int(x.split("about ")[1].split(" ")[0]) for x in said if "s left" in x]
+        assert left and left[-1] <= max(left)
+        assert "s left" not in next(x for x in said if "way 1" in x)
 
 
 class TestTheSearch:

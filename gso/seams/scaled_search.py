@@ -21,6 +21,7 @@ from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.region_merges import Merges
+from gso.seams.remaining_time import DESIGN, after_design, after_divisions, after_ways
 from gso.seams.symmetry import symmetric_points
 from gso.seams.trial import Allowed, Trial, tried
 from gso.seams.wanted import Wanted
@@ -112,7 +113,9 @@ def _first(search: CopySearch, labels: list[Ints]) -> list[Trial]:
     found: list[Trial] = []
     for number, label in enumerate(labels, 1):
         pieces = int(label.max()) + 1
-        search.settings.say(f"seams, way {number} of {len(labels)}: {pieces} pieces")
+        after = after_ways(search.settings.effort, len(labels) - number)
+        said = f"seams, way {number} of {len(labels)}: {pieces} pieces"
+        search.remaining.begin(said, 1.0, after)
         found.append(search.measured(label, most=_NEARLY))
         far = min(float(one.excess.max()) for one in found) > _FAR
         if found[-1].holds or (far and number >= _ENOUGH):
@@ -126,14 +129,16 @@ def _refined(search: CopySearch, trial: Trial, most: float = _FEW) -> list[Trial
     Few are those with up to some share of the area.
     """
     found: list[Trial] = []
-    while len(found) < search.settings.effort.divisions:
+    effort = search.settings.effort
+    while len(found) < effort.divisions:
         few = _failed(search, trial) <= most or trial.excess.max() <= _LITTLE
         if trial.holds or _hopeless(trial) or not few:
             break
         label = search.smaller(trial, trial.of_regions())
         if np.array_equal(label, trial.label):
             break
-        search.settings.say(f"seams and shape: {label.max() + 1} pieces")
+        after = after_divisions(effort, effort.divisions - len(found) - 1)
+        search.remaining.begin(f"seams and shape: {label.max() + 1} pieces", 1.0, after)
         trial = search.measured(label)
         found.append(trial)
     return found
@@ -167,7 +172,8 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
     trial, others = trials[-1], trials[:-1]
     rounds = settings.effort.rounds
     for number in range(rounds):
-        settings.say(f"the design's own pieces, attempt {number + 1}")
+        said = f"the design's own pieces, attempt {number + 1}"
+        search.remaining.begin(said, DESIGN, after_design())
         own = _carried(search, trial)
         found.append(own)
         if own.holds or _hopeless(own) or number == rounds - 1:
