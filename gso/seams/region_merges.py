@@ -8,7 +8,6 @@ from gso.mesh.topology import label_components
 from gso.seams.budgets import Budgets
 from gso.seams.copy_search import CopySearch
 from gso.seams.regions import numbered
-from gso.seams.remaining_time import after_merges
 from gso.seams.trial import Trial
 from gso.typing import Ints
 
@@ -75,7 +74,7 @@ class Merges:
         while pairs and solves > 0:
             solves -= 1
             said = f"{len(best.pieces)} pieces, without {len(pairs)} of them"
-            search.remaining.begin(said, 1.0, after_merges(solves))
+            search.remaining.of_copy(said, solves)
             label = self._joined(pairs)
             trial = search.measured(label, best.width)
             if trial.holds and Budgets(trial, search.settings).missing <= before:
@@ -96,8 +95,7 @@ class Merges:
         """Make boundaries fair over a larger width, so that narrow places disappear."""
         search, best = self._search, self.best
         width = factor * search.width
-        said = f"{len(best.pieces)} pieces, wider at their necks"
-        search.remaining.begin(said, 1.0, after_merges(left))
+        search.remaining.of_copy(f"{len(best.pieces)} pieces, wider at their necks", left)
         trial = search.measured(search.alike(search.fair(best.label, width)), width)
         missing = [Budgets(one, search.settings).missing for one in (trial, best)]
         if trial.holds and missing[0] < missing[1]:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from gso.seams.options import Effort
-
-#: What a solve of the design's own pieces takes, and laying them flat in the end, over a solve of
-#: pieces of the copy.
-DESIGN, _END = 3.0, 1.0
-#: Shares of the solves that an effort allows which a search takes on average.
-_WAYS, _DIVISIONS, _MERGES = 0.5, 0.6, 0.4
+#: What the first solve of the design's own pieces is likely to take, and what follows the last,
+#: over what a solve of pieces of the copy takes.
+_DESIGN, _END = 2.0, 1.0
+#: Share of the solves that may follow which do on average.
+_LIKELY = 0.5
 
 
 class RemainingTime:
     """Says what a search does, and for about how many seconds it is likely to go on.
 
-    Amounts of work are in solves of pieces of the copy. The search does not depend on the clock.
+    The search does not depend on the clock.
 
     Parameters
     ----------
@@ -31,48 +29,42 @@ class RemainingTime:
         self, say: Callable[[str], None], clock: Callable[[], float] = time.perf_counter
     ) -> None:
         self._say, self._clock = say, clock
-        self._start = clock()
-        self._done = self._current = 0.0
+        # Of finished solves.
+        self._of_copy: list[float] = []
+        self._of_design: list[float] = []
+        self._running: list[float] | None = None
+        self._begun = 0.0
 
-    def begin(self, said: str, work: float, after: float) -> None:
-        """Say what begins.
-
-        Parameters
-        ----------
-        said : str
-        work : float
-            What it is likely to take.
-        after : float
-            What is likely to follow.
-        """
-        self._done += self._current
-        self._current = work
-        if self._done > 0.0:
-            per_solve = (self._clock() - self._start) / self._done
-            said += f", about {_rounded(per_solve * (work + after))} s left"
+    def of_copy(self, said: str, possible: int) -> None:
+        """Say that pieces of the copy are solved, after which so many such solves may follow."""
+        self._begin(self._of_copy)
+        if self._of_copy:
+            seconds = _mean(self._of_copy)
+            solves = 1.0 + _LIKELY * possible + _DESIGN + _END
+            said += _left(seconds * solves)
         self._say(said)
 
+    def of_design(self, said: str, possible: int) -> None:
+        """Say that the design's own pieces are solved, perhaps with so many more attempts."""
+        self._begin(self._of_design)
+        if self._of_copy:
+            seconds = _mean(self._of_copy)
+            own = _mean(self._of_design) if self._of_design else _DESIGN * seconds
+            said += _left(own * (1.0 + _LIKELY * possible) + _END * seconds)
+        self._say(said)
 
-def after_ways(effort: Effort, left: int) -> float:
-    """Return the work that follows a division, where so many others could be tried before it."""
-    return _WAYS * left + after_divisions(effort, effort.divisions)
-
-
-def after_divisions(effort: Effort, left: int) -> float:
-    """Return the work that follows where regions may be divided so many times more."""
-    return _DIVISIONS * left + after_merges(effort.merges)
-
-
-def after_merges(left: int) -> float:
-    """Return the work that follows where regions may be merged so many times more."""
-    return _MERGES * left + DESIGN + _END
-
-
-def after_design() -> float:
-    """Return the work that follows a solve of the design's own pieces."""
-    return _END
+    def _begin(self, solves: list[float]) -> None:
+        """Note the time of the solve that ends, and that one begins."""
+        now = self._clock()
+        if self._running is not None:
+            self._running.append(now - self._begun)
+        self._running, self._begun = solves, now
 
 
-def _rounded(seconds: float) -> int:
-    """Round seconds, from ten on to fives."""
-    return round(seconds) if seconds < 10.0 else 5 * round(seconds / 5.0)
+def _mean(seconds: list[float]) -> float:
+    return sum(seconds) / len(seconds)
+
+
+def _left(seconds: float) -> str:
+    """Return seconds in words: from ten on, rounded to fives."""
+    return f", about {round(seconds) if seconds < 10.0 else 5 * round(seconds / 5.0)} s left"
