@@ -96,7 +96,7 @@ def perturbed(
     for name, mesh in _designs(files, shapes, "perturbed"):
         asked = {"max_strain": _WHOLE, "effort": effort}
         asked["max_deviation"] = 0.01 * float(share) * mesh.diagonal
-        found = [quietly(gso.pieces, one, **asked) for one in _variants(mesh, runs)]
+        found = [quietly(gso.pieces, one, **asked) for one in variants(mesh, runs)]
         figures = {
             "pieces": [len(one) for one in found],
             "seam": [one.seam_length for one in found],
@@ -265,7 +265,7 @@ def _designs(files: str, shapes: str, text: str) -> Any:
     return progress([(path.stem, gso.as_mesh(path)) for path in given], text)
 
 
-def _variants(mesh: Mesh, runs: int) -> Iterator[Mesh]:
+def variants(mesh: Mesh, runs: int) -> Iterator[Mesh]:
     """Yield a mesh as it is, and then with moved coordinates and with other numbers, in turn."""
     for run in range(runs):
         random = np.random.default_rng(run)

@@ -125,7 +125,8 @@ def of_found(
     """Make strips of pieces that the search for them has made developable; see `of_pieces`."""
     if found.result is None:
         raise ValueError("the search did not change the shape of the pieces")
-    joint = _Joint(light.design, found, found.result)
+    shape = Pieces(found.design, found.opened, found.names)
+    joint = _Joint(light.design, shape, found.result)
     return _of_joint(joint, request, light, found.design, found.seconds)
 
 
