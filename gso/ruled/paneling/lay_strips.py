@@ -261,8 +261,6 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
 _FAR = 0.6
 #: Number of strips from which those along lines are nearer than others.
 _MANY = 8
-#: Ratio of the distance of pieces to the largest one from which other pieces are of no use.
-_HOPELESS = 2.0
 
 
 @dataclass(frozen=True)
@@ -351,7 +349,7 @@ class _Task:
             except GSOError as error:
                 failed = error
             else:
-                if tried[-1].ended or self._out_of_reach(tried[-1]):
+                if tried[-1].ended:
                     break
         if failed is not None and not tried:
             raise failed
@@ -401,11 +399,6 @@ class _Task:
             return self._judged_pieces(*of_pieces(light, asked, division, single=single))
 
         return [nearer] if found.result is None else [as_found, nearer]
-
-    def _out_of_reach(self, pieces: Tried) -> bool:
-        """Return whether pieces are so far away that others do not hold the distance either."""
-        allowed = self.request.max_deviation
-        return allowed is not None and pieces.far > _HOPELESS * allowed
 
     def _answer(self, tried: Sequence[Tried]) -> Result:
         few = self.request.options.number is None
