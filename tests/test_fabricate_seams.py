@@ -16,6 +16,7 @@ from gso.verdict import Code
 from gso.workshop import Design, FabricationSettings, made
 from tests.conftest import codes
 from tests.test_pieces import dome
+from tests.test_seams import ball
 from tests.test_workshop import arch
 
 #: Over the ridge of the dome below.
@@ -75,6 +76,16 @@ def test_a_design_as_it_is_meets_its_constraints_or_changes():
     moved = made(Design("d", sheet, constraints=(gso.Handle([0], goal),)), settings)
     points = moved.panels[0].surface.vertices
     assert np.linalg.norm(points - goal, axis=1).min() < 1e-8
+
+
+def test_seams_are_searched_for_once(tmp_path):
+    said = []
+    design, allowed = ball(10), "5%"
+    job = gso.fabricate(design, tmp_path, max_deviation=allowed, callback=said.append, **QUICK)
+    assert job.usable, job.reasons
+    assert sum(text.endswith("seams and shape, attempt 1") for text in said) == 1
+    (record,) = job.certificate["designs"]
+    assert record["pieces"] > 1 and record["deviation_max"] <= record["allowed"]
 
 
 def test_preferences_without_effect_are_noted(tmp_path):

@@ -7,7 +7,7 @@ import gso
 from gso import metrics
 from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
-from gso.seams import CoarseCopy, Creases, Regions, Segmentation, Slice
+from gso.seams import CoarseCopy, Creases, Regions, RemainingTime, Segmentation, Slice
 
 
 def ball(side: int) -> Mesh:
@@ -144,9 +144,16 @@ def searched(**options) -> Segmentation:
 
 
 @pytest.fixture(scope="module")
-def free() -> Segmentation:
+def told() -> tuple[Segmentation, list[str]]:
+    """Pieces of which nothing else is asked, and what the search for them said."""
+    said: list[str] = []
+    return searched(callback=said.append), said
+
+
+@pytest.fixture(scope="module")
+def free(told) -> Segmentation:
     """Pieces of which nothing else is asked."""
-    return searched()
+    return told[0]
 
 
 class TestNoise:
@@ -173,6 +180,36 @@ class TestNoise:
     def test_another_word_is_an_error(self):
         with pytest.raises(gso.OptionError, match="denoise is 'yes'"):
             gso.pieces(ball(8), denoise="yes")
+
+
+class TestTheRemainingTime:
+    def test_it_is_known_from_the_second_solve_on(self):
+        said, now = [], iter([0.0, 2.0, 5.0, 9.0])
+        remaining = RemainingTime(said.append, lambda: next(now))
+        for name, possible in (("one", 4), ("two", 2), ("three", 0)):
+            remaining.of_copy(name, possible)
+        remaining.of_design("four", 0)
+        left = [int(text.split(", about ")[1].removesuffix(" s left")) for text in said[1:]]
+        assert said[0] == "one" and left == sorted(left, reverse=True)
+        # Of three solves, at three seconds each; the design's own pieces take longer than one.
+        assert 3.0 < left[-1] <= 5 * 3.0
+
+    def test_it_grows_with_what_may_follow_and_with_the_time_of_a_solve(self):
+        def left(seconds, possible):
+            said, now = [], iter([0.0, seconds])
+            remaining = RemainingTime(said.append, lambda: next(now))
+            remaining.of_copy("one", 0)
+            remaining.of_copy("two", possible)
+            return int(said[1].split("about ")[1].split(" ")[0])
+
+        assert left(20.0, 0) < left(20.0, 4) < left(20.0, 40)
+        assert left(80.0, 4) == pytest.approx(4 * left(20.0, 4), rel=0.1)
+
+    def test_a_search_says_it(self, told):
+        _, said = told
+        left = [int(x.split("about ")[1].split(" ")[0]) for x in said if "s left" in x]
+        assert left and min(left) >= 0
+        assert "s left" not in next(x for x in said if "way 1" in x)
 
 
 class TestTheSearch:

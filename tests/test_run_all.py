@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import gso
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "bench"))
 
@@ -515,6 +517,19 @@ def test_tables_of_docs_come_from_older_figures_too(tiny, monkeypatch):
     found = tables.measured(result)
     assert "Time, NumPy" not in found["measured-developable"]
     assert "kernels" not in found["measured-machine"]
+
+
+def test_designs_are_cut_again_with_other_numbers():
+    from sections.pieces import variants
+
+    mesh = gso.as_mesh(([[0, 0, 0], [3, 0, 0], [3, 2, 0], [0, 1, 1]], [[0, 1, 2], [0, 2, 3]]))
+    given, moved, other = variants(mesh, 3)
+    assert given is mesh
+    away = np.abs(moved.vertices - mesh.vertices).max()
+    assert 0.0 < away <= 1e-9 * mesh.diagonal
+    assert not np.array_equal(other.vertices, mesh.vertices)
+    corners = [sorted(np.sort(m.vertices[m.faces].sum(axis=2)).tolist()) for m in (mesh, other)]
+    np.testing.assert_allclose(*corners)
 
 
 def test_sections_are_listed_and_take_settings(tmp_path):

@@ -8,16 +8,16 @@ NAME_vertices, NAME_faces) the designs of ``examples/whole.py`` are cut.
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from harness import example, medians, progress, quietly, reference, tabulate, timed
+from piece_peers import PUBLISHED, as_many, has_xatlas, least_strained
 
 import gso
 from gso import faults, metrics
-from gso.components import split
 from gso.mesh import Mesh
 
 #: Allowed strain and distance (per cent of the diagonal) of designs that may change.
@@ -25,6 +25,10 @@ _JOINT = 2e-4
 _AWAY = (3.0, 2.0)
 #: Strain up to which pieces are cut before they become ruled.
 _WHOLE = 1e-3
+#: Columns of the comparison with peers.
+_PEERS = ("pieces", "seam", "mean %", "max %", "p99", "largest", "s")
+#: How far coordinates are moved, relative to the diagonal.
+_MOVED = 1e-9
 _Rows = dict[Any, dict[str, Any]]
 
 
@@ -57,10 +61,8 @@ def within(
     ``files=A.obj,B.off`` names meshes to take instead; ``seam turn`` is in degrees per cent of the
     diagonal, ``smallest %`` the area of the smallest piece over all.
     """
-    given = [Path(name) for name in files.split(",") if name]
-    designs = [(path.stem, gso.as_mesh(path)) for path in given] or _shapes(shapes, "within")
     rows: _Rows = {}
-    for name, mesh in designs:
+    for name, mesh in _designs(files, shapes, "within"):
         far = 0.01 * float(share) * mesh.diagonal
         asked = {"max_strain": _WHOLE, "max_deviation": far, "effort": effort}
         found = quietly(gso.pieces, mesh, **asked)
@@ -75,6 +77,74 @@ def within(
             "s": row["s"],
         }
     return tabulate(f"within {share} %, {effort}", ["design"], rows)
+
+
+def perturbed(
+    files: str = "",
+    shapes: str = "",
+    share: str = "1.75",
+    effort: str = "standard",
+    runs: int = 10,
+) -> dict[str, Any]:
+    """Cut every design several times, each time with other coordinates or numbers of vertices.
+
+    The first run has the design as it is. Then coordinates are moved by 1e-9 of the diagonal, and
+    vertices and faces renumbered, in turn. Columns are the smallest, median and largest number of
+    pieces and length of seams. Options are those of ``within``.
+    """
+    rows: _Rows = {}
+    for name, mesh in _designs(files, shapes, "perturbed"):
+        asked = {"max_strain": _WHOLE, "effort": effort}
+        asked["max_deviation"] = 0.01 * float(share) * mesh.diagonal
+        found = [quietly(gso.pieces, one, **asked) for one in variants(mesh, runs)]
+        figures = {
+            "pieces": [len(one) for one in found],
+            "seam": [one.seam_length for one in found],
+        }
+        rows[name] = {
+            f"{what} {word}": float(how(values))
+            for what, values in figures.items()
+            for word, how in (("min", np.min), ("median", np.median), ("max", np.max))
+        }
+        rows[name]["usable"] = f"{sum(one.usable for one in found)}/{runs}"
+        rows[name]["s"] = float(np.median([one.seconds for one in found]))
+    return tabulate(f"{runs} runs within {share} %, {effort}", ["design"], rows)
+
+
+def peers(
+    files: str = "",
+    shapes: str = "",
+    share: str = "1.75",
+    effort: str = "standard",
+    strain: str = "0.01",
+) -> dict[str, Any]:
+    """Compare pieces with charts of xatlas, with pieces of the same shape, and with publications.
+
+    ``xatlas, as many`` has about as many charts as there are pieces, and ``xatlas, least`` its
+    lowest distortion. ``as is`` are pieces within a strain whose shape does not change. Published
+    results are below the design of their name. Options are those of ``within``.
+    """
+    rows: _Rows = {}
+    for name, mesh in _designs(files, shapes, "peers"):
+        far = 0.01 * float(share) * mesh.diagonal
+        found = quietly(gso.pieces, mesh, max_strain=_WHOLE, max_deviation=far, effort=effort)
+        kept = quietly(gso.pieces, mesh, max_strain=float(strain))
+        kinds: _Rows = {}
+        for kind, one in ((f"within {share} %", found), (f"as is, strain {strain}", kept)):
+            kinds[kind] = _of_found(one, 100.0 / mesh.diagonal)
+            kinds[kind]["largest"] = one.metrics["strain_max"]
+        if has_xatlas():
+            kept_shape = {"mean %": 0.0, "max %": 0.0}
+            kinds["xatlas, as many"] = as_many(mesh, len(found)) | kept_shape
+            kinds["xatlas, least"] = least_strained(mesh) | kept_shape
+        for published in PUBLISHED:
+            if published in name.lower():
+                kinds["published"] = PUBLISHED[published]
+        for kind, figures in kinds.items():
+            rows[name, kind] = {key: figures.get(key, np.nan) for key in _PEERS}
+    every = tabulate("pieces and their peers", ["design", ""], rows)
+    title = "published results, of meshes that are not all here"
+    return every | {"published": tabulate(title, ["design"], PUBLISHED)}
 
 
 def ruled(shapes: str = "") -> dict[str, Any]:
@@ -113,8 +183,9 @@ def uncut(shapes: str = "") -> dict[str, Any]:
             "uncut": (1, 0.0, result.metrics.get("strain_p99", np.nan)),
             "as is": (len(found), found.seam_length, found.metrics["strain_p99"]),
         }
-        if importlib.util.find_spec("xatlas"):
-            kinds["xatlas"] = _xatlas(mesh)
+        if has_xatlas():
+            charts = least_strained(mesh)
+            kinds["xatlas"] = charts["pieces"], charts["seam"], charts["p99"]
         for kind, figures in kinds.items():
             row = dict(zip(("pieces", "seam", "p99"), figures, strict=True))
             rows[name, kind] = row | {"mean %": 0, "max %": 0}
@@ -186,6 +257,30 @@ def _of_found(found: gso.seams.Segmentation, percent: float) -> dict[str, Any]:
     }
 
 
+def _designs(files: str, shapes: str, text: str) -> Any:
+    """Yield the designs of mesh files, or else those of :func:`_shapes`, by name."""
+    given = [Path(name) for name in files.split(",") if name]
+    if not given:
+        return _shapes(shapes, text)
+    return progress([(path.stem, gso.as_mesh(path)) for path in given], text)
+
+
+def variants(mesh: Mesh, runs: int) -> Iterator[Mesh]:
+    """Yield a mesh as it is, and then with moved coordinates and with other numbers, in turn."""
+    for run in range(runs):
+        random = np.random.default_rng(run)
+        if run == 0:
+            yield mesh
+        elif run % 2:
+            moves = random.uniform(-1.0, 1.0, mesh.vertices.shape)
+            yield mesh.replaced(mesh.vertices + _MOVED * mesh.diagonal * moves)
+        else:
+            order = random.permutation(len(mesh.vertices))
+            faces = random.permutation(mesh.faces)
+            number = np.argsort(order)
+            yield Mesh(mesh.vertices[order], np.where(faces < 0, -1, number[faces]))
+
+
 def _shapes(path: str, text: str) -> Any:
     """Yield the designs of a file, or those of the examples, by name."""
     if path:
@@ -208,36 +303,4 @@ def _ball(count: int) -> Mesh:
     return Mesh(points, ConvexHull(points).simplices)
 
 
-def _xatlas(mesh: Mesh) -> tuple[int, float, float]:
-    """Return charts, seam and strain of xatlas at its lowest distortion."""
-    import xatlas
-
-    atlas = xatlas.Atlas()
-    atlas.add_mesh(mesh.vertices.astype(np.float32), mesh.triangles.astype(np.uint32))
-    options = xatlas.ChartOptions()
-    options.max_cost = 0.5
-    atlas.generate(options)
-    vertex, faces, flat = atlas[0]
-    opened = Mesh(mesh.vertices[vertex], faces.astype(np.int64))
-    flat = flat.astype(float) * [atlas.width, atlas.height]
-    strain = 0.0
-    for part in split(opened):
-        # Each chart at its own best scale, and not mirrored.
-        own = flat[part.vertices]
-        if len(metrics.flipped_faces(part.mesh, own)) > 0.5 * len(part.faces):
-            own = own * [-1.0, 1.0]
-        image = metrics.area(part.mesh, own)
-        own = own * np.sqrt(part.area / image)
-        strain = max(strain, metrics.strains(part.mesh, own)["strain_p99"])
-    length, rim = (
-        sum(
-            float(np.linalg.norm(m.vertices[x] - m.vertices[np.roll(x, 1)], axis=1).sum())
-            for x in m.boundary_loops
-        )
-        for m in (opened, mesh)
-    )
-    seam = 0.5 * (length - rim) / np.sqrt(metrics.area(mesh))
-    return int(atlas.chart_count), seam, strain
-
-
-SECTIONS = (as_is, joint, within, ruled, uncut, minimax, times)
+SECTIONS = (as_is, joint, within, perturbed, peers, ruled, uncut, minimax, times)

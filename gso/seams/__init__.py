@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gso.seams.disks import opening
     from gso.seams.inverted_faces import inverted_at_seams
     from gso.seams.regions import Regions
+    from gso.seams.remaining_time import RemainingTime
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
@@ -36,6 +37,7 @@ __all__ = [
     "Pieces",
     "Polyline",
     "Regions",
+    "RemainingTime",
     "Seam",
     "Segmentation",
     "Sheet",
@@ -54,6 +56,7 @@ __getattr__, __dir__ = at_first_use(
         "coarse_copy": "CoarseCopy",
         "disks": "opening",
         "regions": "Regions",
+        "remaining_time": "RemainingTime",
         "search": "pieces",
         "inverted_faces": "inverted_at_seams",
         "segmentation": "Segmentation",

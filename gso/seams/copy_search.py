@@ -22,6 +22,7 @@ from gso.seams.merging import Merging
 from gso.seams.options import PieceSettings
 from gso.seams.potential import Potential
 from gso.seams.regions import Divided, Regions, numbered
+from gso.seams.remaining_time import RemainingTime
 from gso.seams.symmetry import Mirror
 from gso.seams.tree import Ground
 from gso.seams.trial import Allowed, Trial, tried
@@ -78,6 +79,11 @@ class CopySearch:
     allowed: Allowed
     settings: PieceSettings
     plane: Plane | None = None
+
+    @cached_property
+    def remaining(self) -> RemainingTime:
+        """Says what is done, and how long the search is likely to go on."""
+        return RemainingTime(self.settings.say)
 
     @cached_property
     def of_copy(self) -> Allowed:

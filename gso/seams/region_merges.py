@@ -63,7 +63,7 @@ class Merges:
                 solves = self._tried(pairs, solves)
             elif unmet.narrow > 0.0 and wider < _OFTEN:
                 wider, solves = wider + 1, solves - 1
-                self._widened(_WIDER**wider)
+                self._widened(_WIDER**wider, min(solves, _OFTEN - wider))
             else:
                 return
 
@@ -73,7 +73,8 @@ class Merges:
         before = Budgets(best, search.settings).missing
         while pairs and solves > 0:
             solves -= 1
-            search.settings.say(f"{len(best.pieces)} pieces, without {len(pairs)} of them")
+            said = f"{len(best.pieces)} pieces, without {len(pairs)} of them"
+            search.remaining.of_copy(said, solves)
             label = self._joined(pairs)
             trial = search.measured(label, best.width)
             if trial.holds and Budgets(trial, search.settings).missing <= before:
@@ -90,11 +91,11 @@ class Merges:
             pairs = [pair for pair in pairs if pair not in failed]
         return solves
 
-    def _widened(self, factor: float) -> None:
+    def _widened(self, factor: float, left: int) -> None:
         """Make boundaries fair over a larger width, so that narrow places disappear."""
         search, best = self._search, self.best
         width = factor * search.width
-        search.settings.say(f"{len(best.pieces)} pieces, wider at their necks")
+        search.remaining.of_copy(f"{len(best.pieces)} pieces, wider at their necks", left)
         trial = search.measured(search.alike(search.fair(best.label, width)), width)
         missing = [Budgets(one, search.settings).missing for one in (trial, best)]
         if trial.holds and missing[0] < missing[1]:

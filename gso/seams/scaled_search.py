@@ -79,15 +79,15 @@ def divided_within(
 
 
 def _along_creases(search: CopySearch, trials: list[Trial]) -> tuple[CopySearch, list[Trial]]:
-    """Search again for seams along the creases around features, and take these if that costs little.
+    """Search again for seams along creases around features, such as a nose.
 
-    Such a feature is a nose, for example.
+    They are taken if that costs little.
     """
     best = trials[-1]
     along, features = search.featured()
     if not best.holds or not 0 < features <= len(best.pieces):
         return search, trials
-    search.settings.say(f"seams along creases, around {features} features")
+    search.settings.say(f"seams along the creases around features: {features}")
     others = _of_copy(along)
     more = len(others[-1].pieces) - len(best.pieces)
     missing = [Budgets(some[-1], search.settings).missing for some in (others, trials)]
@@ -100,14 +100,16 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     """Return the trials on the copy that hold, the best last; the best one if none does."""
     effort = search.settings.effort
     found: list[Trial] = []
-    for level in LEVELS:
+    for number, level in enumerate(LEVELS, 1):
         labels = [one for one in search.divided(level) if not _known(one, found)]
-        some = _first(search, labels[: effort.variants])
+        # Other bounds may take as many solves as those before.
+        others = (len(LEVELS) - number) * max(len(found) // max(number - 1, 1), 1)
+        some = _first(search, labels[: effort.variants], others)
         if some and not some[-1].holds:
             best = min(some, key=lambda one: float(one.excess.max()))
             if _NEARLY < best.excess.max() <= _LITTLE:
                 some.append(best := search.measured(best.label))
-            some += _refined(search, best)
+            some += _refined(search, best, others)
         found += some
         if any(one.holds for one in found) or (found and _hopeless(found[-1])):
             break
@@ -115,7 +117,7 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     if not best.holds and not _hopeless(best):
         # Most of the design holds in no division: go on with the one that holds in most places.
         best = min(found, key=lambda one: _failed(search, one))
-        found += _refined(search, best, most=1.0)
+        found += _refined(search, best, 0, most=1.0)
         best = min(found, key=lambda one: _rank(one, search.settings))
     if not best.holds:
         return [best]
@@ -129,12 +131,18 @@ def _known(label: Ints, found: list[Trial]) -> bool:
     return any(np.array_equal(label, one.label) for one in found)
 
 
-def _first(search: CopySearch, labels: list[Ints]) -> list[Trial]:
-    """Try divisions until one holds, which is the last one then."""
+def _first(search: CopySearch, labels: list[Ints], others: int) -> list[Trial]:
+    """Try divisions until one holds, which is the last one then.
+
+    So many solves may follow with other bounds.
+    """
+    effort = search.settings.effort
     found: list[Trial] = []
     for number, label in enumerate(labels, 1):
         pieces = int(label.max()) + 1
-        search.settings.say(f"seams, way {number} of {len(labels)}: {pieces} pieces")
+        possible = len(labels) - number + effort.divisions + others + effort.merges
+        said = f"seams, way {number} of {len(labels)}: {pieces} pieces"
+        search.remaining.of_copy(said, possible)
         found.append(search.measured(label, most=_NEARLY))
         far = min(float(one.excess.max()) for one in found) > _FAR
         if found[-1].holds or (far and number >= _ENOUGH):
@@ -142,20 +150,22 @@ def _first(search: CopySearch, labels: list[Ints]) -> list[Trial]:
     return found
 
 
-def _refined(search: CopySearch, trial: Trial, most: float = _FEW) -> list[Trial]:
+def _refined(search: CopySearch, trial: Trial, others: int, most: float = _FEW) -> list[Trial]:
     """Divide regions that do not hold, as long as these are few or nearly do.
 
-    Few are those with up to some share of the area.
+    Few are those with up to some share of the area. So many solves may follow with other bounds.
     """
     found: list[Trial] = []
-    while len(found) < search.settings.effort.divisions:
+    effort = search.settings.effort
+    while len(found) < effort.divisions:
         few = _failed(search, trial) <= most or trial.excess.max() <= _LITTLE
         if trial.holds or _hopeless(trial) or not few:
             break
         label = search.smaller(trial, trial.of_regions())
         if np.array_equal(label, trial.label):
             break
-        search.settings.say(f"seams and shape: {label.max() + 1} pieces")
+        possible = effort.divisions - len(found) - 1 + others + effort.merges
+        search.remaining.of_copy(f"seams and shape: {label.max() + 1} pieces", possible)
         trial = search.measured(label, begin=trial)
         found.append(trial)
     return found
@@ -190,7 +200,9 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
     begin: Trial | None = None
     rounds = settings.effort.rounds
     for number in range(rounds):
-        settings.say(f"the design's own pieces, attempt {number + 1}")
+        # The first attempt is mostly the last.
+        possible = rounds - number - 1 if number else 0
+        search.remaining.of_design(f"the design's own pieces, attempt {number + 1}", possible)
         own = _carried(search, trial, begin)
         found.append(own)
         if own.holds or _hopeless(own) or number == rounds - 1:

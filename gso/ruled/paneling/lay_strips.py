@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -24,7 +24,7 @@ from gso.ruled.paneling.along import Along
 from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import MOST, Options
-from gso.ruled.paneling.piece_strips import JOINT, found_pieces, of_pieces
+from gso.ruled.paneling.piece_strips import found_pieces, of_found, of_pieces
 from gso.ruled.paneling.sheet_strips import (
     against_parts,
     against_sheet,
@@ -261,8 +261,6 @@ def lay_strips(given: MeshLike | Pieces, request: StripsRequest) -> Result:
 _FAR = 0.6
 #: Number of strips from which those along lines are nearer than others.
 _MANY = 8
-#: Ratio of the distance of pieces to the largest one from which other pieces are of no use.
-_HOPELESS = 2.0
 
 
 @dataclass(frozen=True)
@@ -337,17 +335,21 @@ class _Task:
                 check_whole(light.mesh)
             if not self.divisible or any(one.holds for one in tried):
                 return self._answer(tried)
-        failed: GSOError | None = None
         if self.division is None:
             # Seams of a design that is not symmetric are not symmetric: nothing else will do.
             asked.seams.check_symmetric(light.mesh, light.allowed)
-        for division in self._divisions(light):
+        failed: GSOError | None = None
+        try:
+            divisions = self._divisions(light)
+        except GSOError as error:
+            divisions, failed = [], error
+        for in_pieces in divisions:
             try:
-                tried.append(self._in_pieces(light, division()))
+                tried.append(in_pieces(tried))
             except GSOError as error:
                 failed = error
             else:
-                if tried[-1].ended or tried[-1].holds or self._out_of_reach(tried[-1]):
+                if tried[-1].ended:
                     break
         if failed is not None and not tried:
             raise failed
@@ -379,21 +381,24 @@ class _Task:
         asked = self.request
         return asked.options.number is None and asked.max_deviation is not None
 
-    def _divisions(self, light: LightDesign) -> Iterator[Callable[[], Pieces]]:
-        """Return the ways to divide the design, those into fewer pieces first."""
+    def _divisions(self, light: LightDesign) -> list[Callable[[Sequence[Tried]], Tried]]:
+        """Return the ways to make strips of the pieces that are given, or that are found."""
         asked, given = self.request, self.division
         if given is not None:
-            yield lambda: given
-            return
-        # Pieces that need all of the distance are fewer. Solved together within a share of it, they
-        # may still be developable enough for strips.
-        yield lambda: _without_darts(found_pieces(light, asked, 1.0))
-        yield lambda: found_pieces(light, asked, JOINT)
+            own = LightDesign(self.design, self.design, asked.max_deviation)
+            return [lambda tried: self._judged_pieces(*of_pieces(own, asked, given))]
+        found = found_pieces(light, asked)
 
-    def _out_of_reach(self, pieces: Tried) -> bool:
-        """Return whether pieces are so far away that others do not hold the distance either."""
-        allowed = self.request.max_deviation
-        return allowed is not None and pieces.far > _HOPELESS * allowed
+        def as_found(tried: Sequence[Tried]) -> Tried:
+            return self._judged_pieces(*of_found(light, asked, found))
+
+        def nearer(tried: Sequence[Tried]) -> Tried:
+            # The search may use all of its distance, and other shapes of its pieces be nearer.
+            division = cut(found.unchanged, Edges(found.edges))
+            single = any(one.holds for one in tried)
+            return self._judged_pieces(*of_pieces(light, asked, division, single=single))
+
+        return [nearer] if found.result is None else [as_found, nearer]
 
     def _answer(self, tried: Sequence[Tried]) -> Result:
         few = self.request.options.number is None
@@ -531,13 +536,10 @@ class _Task:
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
         return [Tried(result, ordered([*own, *against_parts(result, asked)]))]
 
-    def _in_pieces(self, light: LightDesign, division: Pieces) -> Tried:
-        asked = self.request
-        if division is self.division:
-            light = LightDesign(self.design, self.design, asked.max_deviation)
-        result, reasons = of_pieces(light, asked, division)
-        result = divided(result, asked)
-        return Tried(result, ordered([*reasons, *against_parts(result, asked)]))
+    def _judged_pieces(self, result: Result, reasons: tuple[Reason, ...]) -> Tried:
+        """Divide strips of pieces for the sheet, and judge them."""
+        result = divided(result, self.request)
+        return Tried(result, ordered([*reasons, *against_parts(result, self.request)]))
 
 
 def _unaligned(lines: LineStrips | None, number: int | None) -> str:

@@ -39,8 +39,9 @@ from gso.typing import Keywords
 from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
 from gso.wording import length
 
-#: Shares of the allowed distance: what the joint solve of the pieces may use, and the least and the
-#: most within which strips follow its result, so that the two sides of a seam stay together.
+#: Shares of the allowed distance: what the joint solve of the pieces and the search for them may
+#: use, and the least and the most within which strips follow the shape of the pieces, so that the
+#: two sides of a seam stay together.
 JOINT, _LEAST, _MOST = 0.9, 0.1, 0.5
 #: Distance within which strips follow the joint result where none is given, relative to the
 #: diagonal.
@@ -78,9 +79,9 @@ class _Joint:
 
 
 def of_pieces(
-    light: LightDesign, request: StripsRequest, division: Pieces
+    light: LightDesign, request: StripsRequest, division: Pieces, *, single: bool = False
 ) -> tuple[Result, tuple[Reason, ...]]:
-    """Make strips of a design in pieces.
+    """Make strips of a design in pieces, which are solved together.
 
     Pieces first become one strip each, with the same points on both sides of their seams. Where
     that does not hold the limits, strips follow the joint result within a distance, so seams are
@@ -93,6 +94,8 @@ def of_pieces(
     request : StripsRequest
     division : Pieces
         The pieces of the design.
+    single : bool
+        Whether only one strip of each piece is of use, with the same points on both sides of seams.
 
     Returns
     -------
@@ -106,18 +109,45 @@ def of_pieces(
     Raises
     ------
     MeshError
-        The pieces cannot be solved, or one of them is no disk.
+        The pieces cannot be solved, or one of them is no disk, or no single strips are found.
     """
     clock = time.perf_counter()
     joint = _together(light, request, division)
     if joint.result.status is Status.CANCELLED:
         return _cancelled(joint), ()
     seconds = time.perf_counter() - clock
-    tried, stopped = _sharing_seams(joint, request, light, division.design)
+    return _of_joint(joint, request, light, division.design, seconds, single=single)
+
+
+def of_found(
+    light: LightDesign, request: StripsRequest, found: Segmentation
+) -> tuple[Result, tuple[Reason, ...]]:
+    """Make strips of pieces that the search for them has made developable; see `of_pieces`."""
+    if found.result is None:
+        raise ValueError("the search did not change the shape of the pieces")
+    shape = Pieces(found.design, found.opened, found.names)
+    joint = _Joint(light.design, shape, found.result)
+    return _of_joint(joint, request, light, found.design, found.seconds)
+
+
+def _of_joint(
+    joint: _Joint,
+    request: StripsRequest,
+    light: LightDesign,
+    target: Mesh,
+    seconds: float,
+    *,
+    single: bool = False,
+) -> tuple[Result, tuple[Reason, ...]]:
+    """Make strips of pieces that are developable, near a target with their vertices."""
+    clock = time.perf_counter()
+    tried, stopped = _sharing_seams(joint, request, light, target)
     if stopped:
         return _cancelled(joint), ()
-    found = bool(tried) and not tried[0][1]
-    for strips, strict in () if found else _candidates(joint, request, light):
+    if single and not tried:
+        raise MeshError("no points on the seams of the pieces make single strips of them")
+    enough = single or (bool(tried) and not tried[0][1])
+    for strips, strict in () if enough else _candidates(joint, request, light):
         if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
             return _cancelled(joint), ()
         # What counts is the distance of the whole from the design, and the gaps at seams.
@@ -127,7 +157,7 @@ def of_pieces(
         if not tried[-1][1]:
             break
     result, reasons = min(tried, key=lambda one: (len(one[1]) > 0, one[0].ruled.farthest))
-    result.seconds |= {"pieces": seconds, "strips": time.perf_counter() - clock - seconds}
+    result.seconds |= {"pieces": seconds, "strips": time.perf_counter() - clock}
     return result, reasons
 
 
@@ -215,8 +245,8 @@ def _candidates(
         yield strips, True
 
 
-def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Segmentation:
-    """Search for seams without darts, so that pieces may use a share of the allowed distance.
+def found_pieces(light: LightDesign, request: StripsRequest) -> Segmentation:
+    """Search for seams without darts, and leave strips of the pieces some of the distance.
 
     Raises
     ------
@@ -227,7 +257,7 @@ def found_pieces(light: LightDesign, request: StripsRequest, share: float) -> Se
     found = search(
         mesh,
         max_strain=request.max_strain,
-        max_deviation=None if light.allowed is None else share * light.allowed,
+        max_deviation=None if light.allowed is None else JOINT * light.allowed,
         darts=False,
         # All lengths are in the design's unit, whatever that is.
         sheet=request.sheet,
