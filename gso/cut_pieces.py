@@ -71,8 +71,11 @@ class Pieces:
 
     @cached_property
     def parts(self) -> list[Component]:
-        """The connected parts of the mesh that is cut open, the largest first."""
-        return sorted(split(self.opened.mesh), key=lambda part: -part.area)
+        """The connected parts of the mesh that is cut open, the largest first.
+
+        Those with the same area, but for rounding, keep the order of their vertices.
+        """
+        return sorted(split(self.opened.mesh), key=lambda part: -float(f"{part.area:.9g}"))
 
     def __len__(self) -> int:
         return len(self.parts)

@@ -31,11 +31,13 @@ from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise, without_noise
 from gso.seams.edge_prices import Avoid, Follow, pairs_of, prices
 from gso.seams.exact_pieces import exact_pieces
+from gso.seams.gores import advised, bent, in_gores
 from gso.seams.kinds import Edges, Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, too_large
 from gso.seams.potential import Potential
 from gso.seams.reshaping import at_scale, reshaped
+from gso.seams.revolution import Revolution
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
@@ -67,7 +69,7 @@ def pieces(
     max_pieces: int | None = None,
     seam: float | None = None,
     darts: bool = False,
-    symmetric: bool = False,
+    symmetric: bool | str = False,
     min_neck: Length | None = None,
     min_size: Length | None = None,
     sheet: tuple[Length, Length] | None = None,
@@ -110,10 +112,14 @@ def pieces(
         Budget of the length of all seams, relative to the root of the design's area.
     darts : bool
         Whether seams may end inside a piece, as in cloth and paper.
-    symmetric : bool
-        Make the seams symmetric. The design has to be: as a surface, where a triangle mesh of 1,000
-        vertices or more may change its shape, and otherwise vertex by vertex; then pieces that
-        overlap themselves are cut, and not joined again elsewhere.
+    symmetric : bool or "mirror"
+        Make the seams symmetric. A body of revolution whose shape may change is cut into gores,
+        strips along its meridians that are all alike, as few as are within `max_deviation`, unless
+        its profile is straight, or seams are given by `keep`, `along` or `avoid`. Other designs,
+        and with "mirror" all of them, have seams that are symmetric about a plane. They have to be
+        symmetric, too: as a surface, where a triangle mesh of 1,000 vertices or more may change
+        its shape, and otherwise vertex by vertex; then pieces that overlap themselves are cut, and
+        not joined again elsewhere.
     min_neck : float or str, optional
         Smallest width of a piece, as for `max_deviation`. When not given, a tenth of the root of
         the area is aimed at, and less is taken where the strain cannot be held otherwise.
@@ -207,23 +213,44 @@ def pieces(
         say=callback or (lambda said: None),
         effort=effort_named(effort),
     )
+    if symmetric not in (False, True, "mirror"):
+        raise OptionError(f'symmetric is {symmetric!r}; it must be True, False or "mirror"')
     design, kept, done = _read(design, keep, denoise)
     said = (*said, *done)
     factor = prices(design, along, avoid)
+    free = not len(kept) and factor is None
+    body = _turned(design, settings.max_deviation) if symmetric is True and free else None
     out = None
-    if as_it_is and factor is None and not symmetric:
+    if as_it_is and factor is None and (body is not None or not symmetric):
         found = exact_pieces(design, kept, settings)
         if found is not None:
             out = packed(found, None, design, kept, settings)
             out = replace(out, notes=(*out.notes, exact.as_it_is(found.strain)))
     if out is None or not (out.usable or crosses_itself(out.reasons)):
         try:
-            other = _searched(design, kept, factor, symmetric, settings, workers)
+            other = None if body is None else in_gores(design, body, settings)
+            if other is None:
+                other = _searched(design, kept, factor, bool(symmetric), settings, workers)
+                if free and not symmetric:
+                    other = _advised(other, design, settings.max_deviation)
             out = other if out is None or other.usable else out
         except GSOError:
             if out is None:
                 raise
     return replace(out, notes=(*said, *out.notes), seconds=time.perf_counter() - clock)
+
+
+def _turned(design: Mesh, distance: float | None) -> Revolution | None:
+    """Return a design as a body of revolution, if it is one and its shape may change."""
+    return None if distance is None else Revolution.of(design, distance)
+
+
+def _advised(found: Segmentation, design: Mesh, distance: float | None) -> Segmentation:
+    """Add a note if the design could be made of gores."""
+    body = _turned(design, distance)
+    if body is None or distance is None or not bent(body, distance):
+        return found
+    return replace(found, notes=(*found.notes, advised(body, distance)))
 
 
 def _of_copies(design: Mesh, vertex: Ints, keep: Kept) -> Kept:

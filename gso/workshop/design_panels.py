@@ -91,11 +91,26 @@ def made(
 
 def _changed(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make a design of flat panels in the way that was asked for."""
+    if _is_gored(given, settings):
+        allowed = settings.distance(given.mesh.diagonal)
+        return _checked(_of_search(given, given.mesh, settings, allowed, say, workers), settings)
     if settings.formulation == "ruled":
         return _strips(given, settings, say, workers)
     if settings.formulation == "flatten":
         return _as_it_is(given, settings, say)
     return _nearly(given, settings, say, workers)
+
+
+def _is_gored(given: Design, settings: FabricationSettings) -> bool:
+    """Tell whether a design is made of gores: bodies of revolution with symmetric seams."""
+    if settings.formulation == "flatten" or not settings.symmetric:
+        return False
+    if given.constraints or any(map(len, (given.kept, given.along, given.avoid))):
+        return False
+    # This imports SciPy.
+    from gso.seams.gores import is_gored
+
+    return is_gored(given.mesh, settings.distance(given.mesh.diagonal))
 
 
 def _mixed(
@@ -320,7 +335,8 @@ def _of_search(
         as_it_is=False,
         workers=workers,
         callback=say,
-        **asked.keywords(mesh, searched),
+        # Constraints are on the vertices of the design.
+        **asked.keywords(mesh, searched, gores=not given.constraints),
     )
     if given.constraints and allowed is not None:
         say("constraints")
@@ -331,7 +347,8 @@ def _of_search(
         raise MeshError(f"{given.name}: a piece cannot be laid flat; {said}")
     bound = None if allowed is None else settings.distance(given.mesh.diagonal)
     record = measurements.of_pattern(given.mesh, found.design, pattern, settings, bound)
-    one = of_surface(given.name, found.design, pattern, record | {"pieces": len(found)})
+    record |= {"pieces": len(found)}
+    one = of_surface(given.name, found.design, pattern, record, found.folded)
     return _bent(replace(one, reasons=found.reasons))
 
 
