@@ -19,8 +19,10 @@ from gso.seams.polyline_seam import Polyline
 if TYPE_CHECKING:
     from gso.seams.coarse_copy import CoarseCopy
     from gso.seams.disks import opening
+    from gso.seams.gores import Gores
     from gso.seams.inverted_faces import inverted_at_seams
     from gso.seams.regions import Regions
+    from gso.seams.revolution import Revolution
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
@@ -29,6 +31,7 @@ __all__ = [
     "CoarseCopy",
     "Creases",
     "Edges",
+    "Gores",
     "Groups",
     "Labels",
     "Path",
@@ -36,6 +39,7 @@ __all__ = [
     "Pieces",
     "Polyline",
     "Regions",
+    "Revolution",
     "Seam",
     "Segmentation",
     "Sheet",
@@ -53,7 +57,9 @@ __getattr__, __dir__ = at_first_use(
     {
         "coarse_copy": "CoarseCopy",
         "disks": "opening",
+        "gores": "Gores",
         "regions": "Regions",
+        "revolution": "Revolution",
         "search": "pieces",
         "inverted_faces": "inverted_at_seams",
         "segmentation": "Segmentation",
