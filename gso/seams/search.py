@@ -296,7 +296,10 @@ def _searched(
             with open_executor(others) as executor:
                 changed = reshaped(ground, replace(aim, executor=executor), plane)
         out = packed(*changed, ground.mesh, ground.kept, settings)
-    return replace(out, notes=(*out.notes, said)) if said else out
+    notes = [said] if said else []
+    if out.design.is_triangles and not ground.mesh.is_triangles:
+        notes.append("seams cross faces, which were divided into triangles")
+    return replace(out, notes=(*out.notes, *notes))
 
 
 def _read(design: Mesh, keep: Kept, denoise: bool | str) -> tuple[Mesh, Ints, list[str]]:

@@ -280,8 +280,9 @@ def _away(shape: Pieces, allowed: Allowed) -> Array:
     design, near, most = allowed.design, allowed.near, allowed.distance
     distance = np.array([float(near.distances(p.mesh.vertices).max()) for p in shape.parts])
     # And back: from the design to the nearest piece.
-    face, away = Nearest(shape.design).nearest(design.vertices[design.used])
-    np.maximum.at(distance, shape.of_face[face], away)
+    surface = shape.opened.mesh
+    face, away = Nearest(surface).nearest(design.vertices[design.used])
+    np.maximum.at(distance, shape.of_vertex[surface.triangles[face, 0]], away)
     if _DOUBTFUL * most < distance.max() <= most:
         # Points inside faces may be farther away than all vertices.
         largest = metrics.largest_distance(design, shape.design)
@@ -290,8 +291,10 @@ def _away(shape: Pieces, allowed: Allowed) -> Array:
 
 
 def _with_flips(trial: Trial) -> Pieces:
-    """Flip the edges of the design at which the solved pieces are folded."""
+    """Flip the edges of a triangle mesh at which the solved pieces are folded."""
     shape, design = trial.shape, trial.pieces.design
+    if not design.is_triangles:
+        return trial.pieces
     mesh = shape.design
     he = mesh.half_edges
     k = he.interior
