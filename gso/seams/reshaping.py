@@ -106,9 +106,9 @@ def _at_scale(ground: Ground, settings: PieceSettings, plane: Plane | None) -> T
     if not design.is_triangles:
         design = Mesh(design.vertices, design.triangles)
     trial = divided_within(design, settings, Wanted.of(ground), plane)
-    # Seams that are symmetric in space cross faces that are not.
-    along = not ground.mesh.is_triangles and plane is None
-    return rows_or_triangles(ground, trial, settings) if along else trial
+    if ground.mesh.is_triangles:
+        return trial
+    return rows_or_triangles(ground, trial, settings, plane)
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:
