@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -199,6 +201,45 @@ class TestTheGores:
             assert (out.folded.angles > 0).all() == (sign > 0)
 
 
+class TestTheWorkshop:
+    @pytest.mark.parametrize("formulation", ["ruled", "curvature"])
+    def test_gores_are_counted_once(self, lamp, found, formulation, tmp_path):
+        job = gso.fabricate(
+            lamp,
+            tmp_path,
+            unit="m",
+            max_deviation=0.05,
+            symmetric=True,
+            formulation=formulation,
+            formats=("svg",),
+            workers=0,
+        )
+        assert [part.count for part in job.parts] == [len(found)] and not job.certificate["reasons"]
+        assert {notch.text for notch in job.parts[0].notches} == {"1"}
+        assert (
+            len(job.parts[0].bends) >= len(found.sheets[0].folded.lines(found.sheets[0].flat)) / 2
+        )
+
+    def test_rings_have_a_second_kind_of_seam(self, tmp_path):
+        job = gso.fabricate(
+            ring(),
+            tmp_path,
+            unit="m",
+            max_deviation=0.06,
+            symmetric=True,
+            formats=("svg",),
+            workers=0,
+        )
+        assert len(job.parts) == 1 and job.parts[0].count > 4
+        assert len({notch.text for notch in job.parts[0].notches}) == 2
+
+    def test_files_say_which_pieces_are_alike(self, found, tmp_path):
+        names = found.save(tmp_path)
+        said = json.loads((tmp_path / "pieces.json").read_text())
+        assert [len(group) for group in said["alike"]] == [len(found)]
+        assert "patterns.svg" in names and len(names) == len(found) + 3
+
+
 class TestWhenThereAreNone:
     def test_a_cylinder_stays_as_it_is(self):
         z = np.linspace(0, 2, 9)
@@ -207,7 +248,7 @@ class TestWhenThereAreNone:
         assert out.usable and len(out) == 1 and out.metrics["deviation_max"] == 0.0
 
     def test_seams_that_are_given_stay(self):
-        small = ball(16, -1.0, 1.0, quads=True)
+        small = ball(12, -1.0, 1.0, quads=True)
         on_rim = small.half_edges.boundary_vertex[small.edges]
         line = small.edges[on_rim.sum(axis=1) == 1][:1]
         out = gores(small, "8%", keep=line, max_strain=0.5)
@@ -215,12 +256,12 @@ class TestWhenThereAreNone:
         assert not any("gores" in note for note in out.notes)
 
     def test_a_note_says_that_there_could_be(self):
-        out = gso.pieces(ball(16, -1.0, 1.0), max_deviation="6%", max_strain=0.3, workers=0)
+        out = gso.pieces(ball(12, -1.0, 1.0), max_deviation="6%", max_strain=0.3, workers=0)
         assert any("body of revolution" in note for note in out.notes)
 
     def test_mirror_asks_for_a_plane_only(self):
         out = gso.pieces(
-            ball(16, -1.0, 1.0, quads=True),
+            ball(12, -1.0, 1.0, quads=True),
             max_deviation="6%",
             max_strain=0.3,
             symmetric="mirror",

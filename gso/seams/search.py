@@ -97,7 +97,8 @@ def pieces(
     ----------
     mesh : Mesh, array_like or path
         The design: closed or with boundary loops, with handles, of one or more components. Quads
-        are cut along edge rows. Where more than two faces share an edge, or parts of the surface
+        are cut along edge rows. Where their shape may change, and that holds less of what is
+        allowed, seams cross faces. Where more than two faces share an edge, or parts of the surface
         share a vertex only, it is divided into sheets, and one-sided surfaces are cut open: the
         vertices keep their numbers, their copies follow, and a note says how many there are.
     max_strain : float or str, optional
@@ -117,7 +118,7 @@ def pieces(
         strips along its meridians that are all alike, as few as are within `max_deviation`, unless
         its profile is straight, or seams are given by `keep`, `along` or `avoid`. Other designs,
         and with "mirror" all of them, have seams that are symmetric about a plane. They have to be
-        symmetric, too: as a surface, where a triangle mesh of 1,000 vertices or more may change
+        symmetric, too: as a surface, where a mesh of 1,000 vertices or more may change
         its shape, and otherwise vertex by vertex; then pieces that overlap themselves are cut, and
         not joined again elsewhere.
     min_neck : float or str, optional
@@ -147,7 +148,7 @@ def pieces(
         Ask first whether the design is developable as it is. Symmetric seams, and seams `along`
         edges or away from faces, are searched for in any case.
     effort : {"draft", "standard", "best"}
-        How long to search where the shape of a triangle mesh of 1,000 vertices or more may change:
+        How long to search where the shape of a mesh of 1,000 vertices or more may change:
         a first look, the usual, or for fewer pieces.
     workers : int, optional
         Number of processes, which a search with `max_deviation` uses; one for each processor by

@@ -21,6 +21,7 @@ from gso.verdict.surface_checks import crossed
 from gso.workshop import constrained, measurements
 from gso.workshop.designs import Design
 from gso.workshop.fabrication_settings import FabricationSettings
+from gso.workshop.matings import alike
 from gso.workshop.mixed_panels import mixed
 from gso.workshop.panels import Made
 from gso.workshop.pattern_panels import of_result, of_surface
@@ -93,7 +94,8 @@ def _changed(given: Design, settings: FabricationSettings, say: Say, workers: in
     """Make a design of flat panels in the way that was asked for."""
     if _is_gored(given, settings):
         allowed = settings.distance(given.mesh.diagonal)
-        return _checked(_of_search(given, given.mesh, settings, allowed, say, workers), settings)
+        one = _of_search(given, given.mesh, settings, allowed, say, workers, gored=True)
+        return _checked(one, settings)
     if settings.formulation == "ruled":
         return _strips(given, settings, say, workers)
     if settings.formulation == "flatten":
@@ -318,6 +320,7 @@ def _of_search(
     allowed: float | None,
     say: Say,
     workers: int | None,
+    gored: bool = False,
 ) -> Made:
     """Search for seams within a distance, and make a panel of each piece."""
     from gso.seams import pieces as search
@@ -349,6 +352,8 @@ def _of_search(
     record = measurements.of_pattern(given.mesh, found.design, pattern, settings, bound)
     record |= {"pieces": len(found)}
     one = of_surface(given.name, found.design, pattern, record, found.folded)
+    if gored and len(found.alike()) == 1:
+        one = replace(one, matings=alike(one.matings))
     return _bent(replace(one, reasons=found.reasons))
 
 
