@@ -256,7 +256,7 @@ class TestWhenThereAreNone:
         assert not any("gores" in note for note in out.notes)
 
     def test_a_note_says_that_there_could_be(self):
-        out = gso.pieces(ball(12, -1.0, 1.0), max_deviation="6%", max_strain=0.3, workers=0)
+        out = gso.pieces(ball(16, -1.0, 1.0), max_deviation="6%", max_strain=0.3, workers=0)
         assert any("body of revolution" in note for note in out.notes)
 
     def test_mirror_asks_for_a_plane_only(self):

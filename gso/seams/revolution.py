@@ -38,7 +38,7 @@ _GAP, _UNIQUE, _ROUNDING = 0.02, 4.0, 1e-9
 #: Largest distance of the surface from that of its profile over the allowed one.
 _SHARE = 0.5
 #: Number of sections, and steps of the profile's line over its length.
-_SECTIONS, _STEPS = 16, 120
+_SECTIONS, _STEPS = 16, 100
 #: Share of the length of a section that its main part has at least.
 _WHOLE = 0.95
 #: Distance of points that are the same, over the length of the section.
@@ -50,8 +50,10 @@ _NOTHING = 1e-9
 #: Largest distance of the profile in fewer points, over the allowed distance and over the root mean
 #: square distance of the sections.
 _SIMPLE, _NOISE = 0.02, 0.2
-#: Number of vertices whose distance from the profile is measured first.
-_FEW = 500
+#: Number of vertices whose distance from the profile is measured first, and in all.
+_FEW, _MANY = 500, 5_000
+#: Largest distance of sections in fewer points from themselves, over the allowed distance.
+_FINE = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ class Revolution:
         end of a closed profile, which begins where its radius is least.
     apart : float
         Largest distance of the surface from that of the profile, as far as it was measured: at
-        the vertices and along sections.
+        vertices, up to some thousand of them, and along sections.
     """
 
     origin: Array
@@ -197,23 +199,19 @@ class _Sections:
 
     def body(self, distance: float) -> Revolution | None:
         """Return the body of revolution about the axis; None if the mesh is too far from it."""
-        line = self.section(0.0)
-        if line is None:
+        most, near = _SHARE * distance, _FINE * distance
+        line = self.section(0.0, near)
+        if line is None or _away(_some(self.points, _FEW), line).max() > 2.0 * most:
             return None
-        most = _SHARE * distance
-        size = float(arc_lengths(line)[-1])
-        line = densified(line, size / _STEPS)
-        few = self.points[:: max(len(self.points) // _FEW, 1)]
-        if _away(few, line).max() > 2.0 * most:
-            return None
-        others = [self.section(turn) for turn in 2.0 * np.pi * np.arange(1, _SECTIONS) / _SECTIONS]
-        known = [densified(other, size / _STEPS) for other in others if other is not None]
+        turns = 2.0 * np.pi * np.arange(1, _SECTIONS) / _SECTIONS
+        others = [self.section(turn, near) for turn in turns]
+        known = [other for other in others if other is not None]
         if len(known) < len(others):
             return None
         samples = np.concatenate([line, *known])
         line = self._ended(_averaged(line, samples), line[[0, -1], 0] == 0.0)
         off = _away(samples, line)
-        apart = max(float(off.max()), float(_away(self.points, line).max()))
+        apart = max(float(off.max()), float(_away(_some(self.points, _MANY), line).max()))
         if apart > most:
             return None
         ends = line[[0, -1]]
@@ -231,18 +229,20 @@ class _Sections:
 
     def _on_left(self, line: Array) -> bool:
         """Tell whether most normals of the mesh are on the left of a line (radius, height)."""
-        mesh, middle = self.mesh, centres(self.mesh) - self.origin
+        middle = _some(centres(self.mesh), _MANY) - self.origin
         height = middle @ self.axis
         away = middle - height[:, None] * self.axis
         radius = lengths(away)
-        normal = metrics.face_normals(mesh)
+        normal = _some(metrics.face_normals(self.mesh), _MANY)
         across = np.einsum("md,md->m", normal, unit(away)), normal @ self.axis
         feet = Polylines.of(line, closed=False).nearest(np.stack([radius, height], axis=1))
         way = np.diff(line, axis=0)[feet.segment]
         return bool((across[1] * way[:, 0] - across[0] * way[:, 1]).sum() >= 0.0)
 
-    def section(self, turn: float) -> Array | None:
+    def section(self, turn: float, near: float) -> Array | None:
         """Return the line (k, 2) of radius and height in a half-plane; None if it is not one.
+
+        It has points in about equal steps, and a given largest distance from the section.
 
         It begins and ends at the boundary of the mesh or on the axis. A closed one begins at its
         least radius, and its first point is repeated at the end.
@@ -264,7 +264,10 @@ class _Sections:
         middle = np.stack([np.zeros(len(ends)), place], axis=1)
         added = np.stack([ends[:, 0], len(points) + np.arange(len(ends))], axis=1)
         links = np.concatenate([links[inside.all(axis=1)], added])
-        return _line(np.concatenate([points, middle]), links)
+        line = _line(np.concatenate([points, middle]), links)
+        if line is None:
+            return None
+        return densified(line[stops(line, near, len(line))], arc_lengths(line)[-1] / _STEPS)
 
     def _ended(self, line: Array, on_axis: Flags) -> Array:
         """Move the ends of an open line onto the axis, or to where the boundary is."""
@@ -310,6 +313,11 @@ def _line(points: Array, links: Ints) -> Array | None:
     line = line[np.r_[True, apart]]
     line[-1] = points[order[-1]]
     return np.asarray(line)
+
+
+def _some(points: Array, count: int) -> Array:
+    """Return about as many of some points as are wanted."""
+    return points[:: max(len(points) // count, 1)]
 
 
 def _away(points: Array, line: Array) -> Array:
