@@ -53,6 +53,13 @@ class Gores:
     body : Revolution
     count : int
         Number of gores, at least 3.
+
+    Examples
+    --------
+    >>> barrel = np.array([[1.0, 1.0], [1.2, 0.0], [1.0, -1.0]])
+    >>> gores = Gores(Revolution(np.zeros(3), np.array([0.0, 0.0, 1.0]), barrel, 0.0), 6)
+    >>> gores.mesh, len(gores.candidate().pieces)
+    (Mesh(36 vertices, 24 faces, quads), 6)
     """
 
     body: Revolution
