@@ -71,8 +71,11 @@ class Pieces:
 
     @cached_property
     def parts(self) -> list[Component]:
-        """The connected parts of the mesh that is cut open, the largest first."""
-        return sorted(split(self.opened.mesh), key=lambda part: -part.area)
+        """The connected parts of the mesh that is cut open, the largest first.
+
+        Those with the same area, but for rounding, keep the order of their vertices.
+        """
+        return sorted(split(self.opened.mesh), key=lambda part: -float(f"{part.area:.9g}"))
 
     def __len__(self) -> int:
         return len(self.parts)
@@ -107,6 +110,14 @@ class Pieces:
             out[part.faces] = k
         return out
 
+    @cached_property
+    def of_vertex(self) -> Ints:
+        """Number of the piece of each vertex (p,) of the mesh that is cut open; -1 for none."""
+        out = np.full(len(self.opened.vertex), -1)
+        for k, part in enumerate(self.parts):
+            out[part.vertices] = k
+        return out
+
     @property
     def edges(self) -> Ints:
         """The edges of the design (s, 2) that were cut."""
@@ -115,10 +126,7 @@ class Pieces:
     @cached_property
     def sides(self) -> Ints:
         """The pieces (s, 2) on both sides of each cut edge; the same piece twice for darts."""
-        number = np.empty(len(self.opened.vertex), np.int64)
-        for k, part in enumerate(self.parts):
-            number[part.vertices] = k
-        return number[self.opened.seams[:, :, 0]]
+        return self.of_vertex[self.opened.seams[:, :, 0]]
 
     @property
     def lengths(self) -> Array:

@@ -182,13 +182,17 @@ min_neck = click.option(
 min_size = click.option(
     "--min-size", metavar="LENGTH", type=LENGTH, help="Smallest length of a piece."
 )
-symmetric = click.option("--symmetric", is_flag=True, help="Symmetric seams.")
+symmetric = click.option(
+    "--symmetric",
+    is_flag=True,
+    help="Symmetric seams; of bodies of revolution gores that are all alike.",
+)
 seam_effort = click.option(
     "--effort",
     type=click.Choice(("draft", "standard", "best")),
     default="standard",
     show_default=True,
-    help="How long to search for seams where the shape of triangles may change: a first look, the "
+    help="How long to search for seams where the shape may change: a first look, the "
     "usual, or for fewer pieces.",
 )
 

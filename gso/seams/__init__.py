@@ -19,9 +19,11 @@ from gso.seams.polyline_seam import Polyline
 if TYPE_CHECKING:
     from gso.seams.coarse_copy import CoarseCopy
     from gso.seams.disks import opening
+    from gso.seams.gores import Gores
     from gso.seams.inverted_faces import inverted_at_seams
     from gso.seams.regions import Regions
     from gso.seams.remaining_time import RemainingTime
+    from gso.seams.revolution import Revolution
     from gso.seams.search import pieces
     from gso.seams.segmentation import Segmentation
     from gso.seams.sheets import Sheet
@@ -30,6 +32,7 @@ __all__ = [
     "CoarseCopy",
     "Creases",
     "Edges",
+    "Gores",
     "Groups",
     "Labels",
     "Path",
@@ -38,6 +41,7 @@ __all__ = [
     "Polyline",
     "Regions",
     "RemainingTime",
+    "Revolution",
     "Seam",
     "Segmentation",
     "Sheet",
@@ -55,8 +59,10 @@ __getattr__, __dir__ = at_first_use(
     {
         "coarse_copy": "CoarseCopy",
         "disks": "opening",
+        "gores": "Gores",
         "regions": "Regions",
         "remaining_time": "RemainingTime",
+        "revolution": "Revolution",
         "search": "pieces",
         "inverted_faces": "inverted_at_seams",
         "segmentation": "Segmentation",

@@ -69,16 +69,34 @@ def base_start(copy: CoarseCopy, trial: Trial, pieces: Pieces) -> Array:
     k = np.flatnonzero((coarse.vertex < count) & (own[coarse.vertex] == 1))
     k = k[single[copy.ids[coarse.vertex[k]]]]
     target = where[copy.ids[coarse.vertex[k]]]
-    moved = solved[k] - copy.mesh.vertices[coarse.vertex[k]]
+    return spread(pieces, target, solved[k] - copy.mesh.vertices[coarse.vertex[k]])
+
+
+def spread(pieces: Pieces, known: Ints, moved: Array, bent: float = _BENT) -> Array:
+    """Return the points of a design in pieces (n, 3), from the displacement of some vertices.
+
+    It is interpolated smoothly on each piece; points on seams are the means of their copies.
+
+    Parameters
+    ----------
+    pieces : Pieces
+    known : ndarray of int, (k,)
+        Vertices of the mesh that is cut open.
+    moved : ndarray, (k, 3)
+        Their displacements.
+    bent : float
+        Weight of the squared Laplacian of the displacement, relative to that of the known values.
+    """
+    opened = pieces.opened
     field = Potential(opened.mesh)
     area = np.maximum(field.area, 1e-6 * float(field.area.mean()))
-    size = float(area.sum()) / max(len(k), 1)
-    known = np.zeros(len(area))
-    known[target] = size
-    bent = field.stiffness @ diags(_BENT * size**2 / area) @ field.stiffness
-    solve = spd(bent + diags(known + _NONE * area))
+    size = float(area.sum()) / max(len(known), 1)
+    own = np.zeros(len(area))
+    own[known] = size
+    bending = field.stiffness @ diags(bent * size**2 / area) @ field.stiffness
+    solve = spd(bending + diags(own + _NONE * area))
     right = np.zeros((len(area), 3))
-    right[target] = size * moved
+    right[known] = size * moved
     away = np.stack([solve(column) for column in right.T], axis=1)
     base = pieces.design.vertices
     points = base[opened.vertex] + away

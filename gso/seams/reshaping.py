@@ -15,17 +15,19 @@ from gso.mesh import Mesh
 from gso.pipeline import strains_of
 from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
+from gso.seams.edge_rows import rows_or_triangles
 from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.joint_solve import solve_pieces
 from gso.seams.options import PieceSettings
 from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
 from gso.seams.tree import Ground
+from gso.seams.trial import Trial
 from gso.seams.wanted import Wanted
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 
-#: Number of vertices of a triangle mesh from which on a copy of it is searched.
+#: Number of vertices of a mesh from which on a copy of it is searched.
 _MANY = 1000
 #: Bound on the estimated strain of the first cuts, the factor between attempts, and the ratio of a
 #: bound that is too large to one that is not at which the search ends.
@@ -70,7 +72,7 @@ def reshaped(
     """
     allowed = np.inf if settings.max_deviation is None else settings.max_deviation
     if at_scale(ground.mesh, settings.max_deviation) and ground.mirror is None:
-        trial = divided_within(ground.mesh, settings, Wanted.of(ground), plane)
+        trial = _at_scale(ground, settings, plane)
         return _patterns(ground, trial.shape, settings), trial.result
     tried: list[_Attempt] = []
     for level in _levels(tried, len(ground.kept)):
@@ -95,7 +97,18 @@ def at_scale(mesh: Mesh, distance: float | None) -> bool:
 
     Coarse designs are at that scale.
     """
-    return distance is not None and mesh.is_triangles and int(mesh.used.sum()) >= _MANY
+    return distance is not None and int(mesh.used.sum()) >= _MANY
+
+
+def _at_scale(ground: Ground, settings: PieceSettings, plane: Plane | None) -> Trial:
+    """Search at the scale of the distance; seams of quads follow edges where that is as good."""
+    design = ground.mesh
+    if not design.is_triangles:
+        design = Mesh(design.vertices, design.triangles)
+    trial = divided_within(design, settings, Wanted.of(ground), plane)
+    if ground.mesh.is_triangles:
+        return trial
+    return rows_or_triangles(ground, trial, settings, plane)
 
 
 def _patterns(ground: Ground, shape: Pieces, settings: PieceSettings) -> Candidate:

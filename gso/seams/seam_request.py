@@ -80,13 +80,14 @@ class SeamRequest:
         """
         if not self.symmetric:
             return
-        # This imports SciPy.
+        # These import SciPy.
+        from gso.seams.revolution import Revolution
         from gso.seams.symmetry import plane_of
 
         mesh = self.searched(design, allowed)
         if self._at_scale(mesh, allowed):
             plane_of(mesh)
-        else:
+        elif allowed is None or Revolution.of(mesh, allowed) is None:
             mirror_of(mesh)
 
     def searched(self, design: Mesh, allowed: float | None) -> Mesh:
@@ -107,13 +108,16 @@ class SeamRequest:
 
         return at_scale(mesh, allowed)
 
-    def keywords(self, design: Mesh, mesh: Mesh) -> Keywords:
-        """Return keywords of :func:`gso.pieces` for a mesh on the vertices of the design."""
+    def keywords(self, design: Mesh, mesh: Mesh, *, gores: bool) -> Keywords:
+        """Return keywords of :func:`gso.pieces` for a mesh on the vertices of the design.
+
+        With `gores`, bodies of revolution may be cut into gores, a new surface.
+        """
         return {
             "max_pieces": self.max_pieces,
             "min_neck": self.min_neck,
             "min_size": self.min_size,
-            "symmetric": self.symmetric,
+            "symmetric": self.symmetric if gores else "mirror" if self.symmetric else False,
             "effort": self.effort,
             "along": self.along,
             "avoid": faces_within(design, self.avoid, mesh),

@@ -31,11 +31,13 @@ from gso.seams.dartless import dartless
 from gso.seams.design_noise import noise, without_noise
 from gso.seams.edge_prices import Avoid, Follow, pairs_of, prices
 from gso.seams.exact_pieces import exact_pieces
+from gso.seams.gores import advised, bent, in_gores
 from gso.seams.kinds import Edges, Seam
 from gso.seams.mirror_plane import mirror_of
 from gso.seams.options import CHANGES, STAYS, PieceSettings, effort_named, too_large
 from gso.seams.potential import Potential
 from gso.seams.reshaping import at_scale, reshaped
+from gso.seams.revolution import Revolution
 from gso.seams.search_result import packed
 from gso.seams.segmentation import Segmentation
 from gso.seams.straight import straight
@@ -67,7 +69,7 @@ def pieces(
     max_pieces: int | None = None,
     seam: float | None = None,
     darts: bool = False,
-    symmetric: bool = False,
+    symmetric: bool | str = False,
     min_neck: Length | None = None,
     min_size: Length | None = None,
     sheet: tuple[Length, Length] | None = None,
@@ -95,7 +97,8 @@ def pieces(
     ----------
     mesh : Mesh, array_like or path
         The design: closed or with boundary loops, with handles, of one or more components. Quads
-        are cut along edge rows. Where more than two faces share an edge, or parts of the surface
+        are cut along edge rows. Where their shape may change, and that holds less of what is
+        allowed, seams cross faces. Where more than two faces share an edge, or parts of the surface
         share a vertex only, it is divided into sheets, and one-sided surfaces are cut open: the
         vertices keep their numbers, their copies follow, and a note says how many there are.
     max_strain : float or str, optional
@@ -110,10 +113,14 @@ def pieces(
         Budget of the length of all seams, relative to the root of the design's area.
     darts : bool
         Whether seams may end inside a piece, as in cloth and paper.
-    symmetric : bool
-        Make the seams symmetric. The design has to be: as a surface, where a triangle mesh of 1,000
-        vertices or more may change its shape, and otherwise vertex by vertex; then pieces that
-        overlap themselves are cut, and not joined again elsewhere.
+    symmetric : bool or "mirror"
+        Make the seams symmetric. A body of revolution whose shape may change is cut into gores,
+        strips along its meridians that are all alike, as few as are within `max_deviation`, unless
+        its profile is straight, or seams are given by `keep`, `along` or `avoid`. Other designs,
+        and with "mirror" all of them, have seams that are symmetric about a plane. They have to be
+        symmetric, too: as a surface, where a mesh of 1,000 vertices or more may change
+        its shape, and otherwise vertex by vertex; then pieces that overlap themselves are cut, and
+        not joined again elsewhere.
     min_neck : float or str, optional
         Smallest width of a piece, as for `max_deviation`. When not given, a tenth of the root of
         the area is aimed at, and less is taken where the strain cannot be held otherwise.
@@ -141,7 +148,7 @@ def pieces(
         Ask first whether the design is developable as it is. Symmetric seams, and seams `along`
         edges or away from faces, are searched for in any case.
     effort : {"draft", "standard", "best"}
-        How long to search where the shape of a triangle mesh of 1,000 vertices or more may change:
+        How long to search where the shape of a mesh of 1,000 vertices or more may change:
         a first look, the usual, or for fewer pieces.
     workers : int, optional
         Number of processes, which a search with `max_deviation` uses; one for each processor by
@@ -207,23 +214,44 @@ def pieces(
         say=callback or (lambda said: None),
         effort=effort_named(effort),
     )
+    if symmetric not in (False, True, "mirror"):
+        raise OptionError(f'symmetric is {symmetric!r}; it must be True, False or "mirror"')
     design, kept, done = _read(design, keep, denoise)
     said = (*said, *done)
     factor = prices(design, along, avoid)
+    free = not len(kept) and factor is None
+    body = _turned(design, settings.max_deviation) if symmetric is True and free else None
     out = None
-    if as_it_is and factor is None and not symmetric:
+    if as_it_is and factor is None and (body is not None or not symmetric):
         found = exact_pieces(design, kept, settings)
         if found is not None:
             out = packed(found, None, design, kept, settings)
             out = replace(out, notes=(*out.notes, exact.as_it_is(found.strain)))
     if out is None or not (out.usable or crosses_itself(out.reasons)):
         try:
-            other = _searched(design, kept, factor, symmetric, settings, workers)
+            other = None if body is None else in_gores(design, body, settings)
+            if other is None:
+                other = _searched(design, kept, factor, bool(symmetric), settings, workers)
+                if free and not symmetric:
+                    other = _advised(other, design, settings.max_deviation)
             out = other if out is None or other.usable else out
         except GSOError:
             if out is None:
                 raise
     return replace(out, notes=(*said, *out.notes), seconds=time.perf_counter() - clock)
+
+
+def _turned(design: Mesh, distance: float | None) -> Revolution | None:
+    """Return a design as a body of revolution, if it is one and its shape may change."""
+    return None if distance is None else Revolution.of(design, distance)
+
+
+def _advised(found: Segmentation, design: Mesh, distance: float | None) -> Segmentation:
+    """Add a note if the design could be made of gores."""
+    body = _turned(design, distance)
+    if body is None or distance is None or not bent(body, distance):
+        return found
+    return replace(found, notes=(*found.notes, advised(body, distance)))
 
 
 def _of_copies(design: Mesh, vertex: Ints, keep: Kept) -> Kept:
@@ -269,7 +297,10 @@ def _searched(
             with open_executor(others) as executor:
                 changed = reshaped(ground, replace(aim, executor=executor), plane)
         out = packed(*changed, ground.mesh, ground.kept, settings)
-    return replace(out, notes=(*out.notes, said)) if said else out
+    notes = [said] if said else []
+    if out.design.is_triangles and not ground.mesh.is_triangles:
+        notes.append("seams cross faces, which were divided into triangles")
+    return replace(out, notes=(*out.notes, *notes))
 
 
 def _read(design: Mesh, keep: Kept, denoise: bool | str) -> tuple[Mesh, Ints, list[str]]:

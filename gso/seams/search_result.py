@@ -25,7 +25,13 @@ from gso.wording import percent
 
 
 def packed(
-    found: Candidate, result: Result | None, given: Mesh, kept: Ints, settings: PieceSettings
+    found: Candidate,
+    result: Result | None,
+    given: Mesh,
+    kept: Ints,
+    settings: PieceSettings,
+    *,
+    rebuilt: bool = False,
 ) -> Segmentation:
     """Measure what was found, and judge it by what was asked for.
 
@@ -39,6 +45,8 @@ def packed(
     kept : ndarray of int, (k, 2)
         The edges of it that were to be cut in any case.
     settings : PieceSettings
+    rebuilt : bool
+        Whether the pieces are a new surface, whose vertices are not those of the design.
     """
     own, sheets, length = found.pieces, found.sheets, found.pieces.seam_length
     count, names = len(own), _names(own)
@@ -70,8 +78,8 @@ def packed(
     numbers["seam_turn"] = turn / along if along > 0 else 0.0
     notes = []
     if result is None:
-        measured |= crossed(given)
-        if settings.max_deviation is not None:
+        measured |= crossed(own.design if rebuilt else given)
+        if settings.max_deviation is not None and not rebuilt:
             numbers |= {"deviation_mean": 0.0, "deviation_max": 0.0}
     else:
         # Both sides of a seam touch, which is no crossing where they are sewn.
@@ -83,10 +91,6 @@ def packed(
             met = np.unique(faults.crossings_at_vertices(own.design))
             faulty[Code.CROSSES_ITSELF] = Measurement.count("face", met)
         measured |= faulty
-        away = metrics.surface_distance(given, own.design)
-        numbers["deviation_mean"] = away.mean
-        numbers["deviation_max"] = away.largest
-        measured[Code.DEVIATION] = Measurement(numbers["deviation_max"])
         numbers["dihedral_mean_before"] = mean_angle(result.design)
         numbers["dihedral_mean"] = mean_angle(result.mesh)
         numbers["dihedral_max"] = float(metrics.dihedral_angles(result.mesh).max(initial=0.0))
@@ -98,6 +102,10 @@ def packed(
                 f"{numbers['dihedral_mean_before']:.3g} to {numbers['dihedral_mean']:.3g} degrees: "
                 "the pieces have facets or wrinkles"
             )
+    if result is not None or rebuilt:
+        away = metrics.surface_distance(given, own.design)
+        numbers |= {"deviation_mean": away.mean, "deviation_max": away.largest}
+        measured[Code.DEVIATION] = Measurement(away.largest)
     reasons = compare(measured, settings.limits)
     codes = {reason.code for reason in reasons}
     if Code.STRAIN in codes:

@@ -89,7 +89,7 @@ class Segmentation(Pieces):
 
     @property
     def folded(self) -> Folded:
-        """The edges of :attr:`pattern` to bend along, where the design is kept as it is."""
+        """The edges of :attr:`pattern` to bend along, of gores and of designs that stay."""
         some = [
             (part.vertices[sheet.folded.edges], sheet.folded.angles, sheet.folded.radii)
             for part, sheet in zip(self.parts, self.sheets, strict=True)

@@ -31,7 +31,7 @@ class Sheet:
     flat : ndarray, (n, 2)
         Its pattern, in the same unit.
     folded : Folded
-        Edges to bend along, where the design is kept as it is.
+        Edges to bend along, of gores and where the design is kept as it is.
     exact_strain : float or None
         The largest strain by the equations of the design's faces, where these are kept: edges of
         the mesh are chords of round faces.

@@ -16,6 +16,8 @@ from gso.typing import Array, Ints
 
 #: Largest distance of a seam from the straight one, in mean edge lengths.
 _NEAR = 0.8
+#: Largest number of edges that a straight part replaces: long ones bend with the surface.
+_LONGEST = 12
 
 
 def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
@@ -54,8 +56,8 @@ def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
         if fixed.intersection(keys):
             lines.append(chain.tolist())
             continue
-        stops = _stops(mesh.vertices[chain], _NEAR * step)
-        for a, b in pairwise(stops):
+        some = stops(mesh.vertices[chain], _NEAR * step, _LONGEST)
+        for a, b in pairwise(some):
             part = chain[a : b + 1].tolist()
             found = walker.walk(part[0], part[-1]) if b - a > 1 else None
             if found is None:
@@ -90,10 +92,26 @@ def straight_seams(pieces: Pieces, kept: Ints) -> tuple[Mesh, Ints]:
     return finer, np.concatenate([np.empty((0, 2), np.int64), *edges])
 
 
-def _stops(points: Array, near: float) -> list[int]:
-    """Choose the points (k, 3) of a line that a straight line between them stays near to.
+def stops(points: Array, near: float, longest: int) -> list[int]:
+    """Choose points of a line (k, d) so that the straight lines between them are near to it.
+
+    Parameters
+    ----------
+    points : ndarray, (k, d)
+    near : float
+        Largest distance of a point from the straight line that replaces it.
+    longest : int
+        Largest number of steps of the line that one straight line replaces.
+
+    Returns
+    -------
+    list of int
+        Numbers of the points, with the first and the last one.
 
     Source: Douglas and Peucker 1973.
+
+    >>> stops(np.array([[0.0, 0], [1, 0.1], [2, 0], [2, 2]]), 0.2, 10)
+    [0, 2, 3]
     """
     keep, todo = {0, len(points) - 1}, [(0, len(points) - 1)]
     while todo:
@@ -105,8 +123,7 @@ def _stops(points: Array, near: float) -> list[int]:
         along = np.clip(away @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
         far = np.linalg.norm(away - along[:, None] * way, axis=1)
         k = int(far.argmax()) + a + 1
-        # Long parts bend with the surface.
-        if far.max() > near or b - a > 12:
+        if far.max() > near or b - a > longest:
             k = k if far.max() > near else (a + b) // 2
             keep.add(k)
             todo += [(a, k), (k, b)]

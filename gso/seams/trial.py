@@ -350,8 +350,9 @@ def _away(shape: Pieces, allowed: Allowed) -> tuple[Array, float]:
     distance = np.array([float(near.distances(p.mesh.vertices).max()) for p in shape.parts])
     outward = float(distance.max()) / most
     # And back: from the design to the nearest piece.
-    face, away = Nearest(shape.design).nearest(design.vertices[design.used])
-    np.maximum.at(distance, shape.of_face[face], away)
+    surface = shape.opened.mesh
+    face, away = Nearest(surface).nearest(design.vertices[design.used])
+    np.maximum.at(distance, shape.of_vertex[surface.triangles[face, 0]], away)
     if _DOUBTFUL * most < distance.max() <= most:
         # Points inside faces may be farther away than all vertices.
         largest = metrics.largest_distance(design, shape.design)
@@ -360,8 +361,10 @@ def _away(shape: Pieces, allowed: Allowed) -> tuple[Array, float]:
 
 
 def _with_flips(trial: Trial) -> Pieces:
-    """Flip the edges of the design at which the solved pieces are folded."""
+    """Flip the edges of a triangle mesh at which the solved pieces are folded."""
     shape, design = trial.shape, trial.pieces.design
+    if not design.is_triangles:
+        return trial.pieces
     mesh = shape.design
     he = mesh.half_edges
     k = he.interior

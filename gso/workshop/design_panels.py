@@ -21,6 +21,7 @@ from gso.verdict.surface_checks import crossed
 from gso.workshop import constrained, measurements
 from gso.workshop.designs import Design
 from gso.workshop.fabrication_settings import FabricationSettings
+from gso.workshop.matings import alike
 from gso.workshop.mixed_panels import mixed
 from gso.workshop.panels import Made
 from gso.workshop.pattern_panels import of_result, of_surface
@@ -91,11 +92,27 @@ def made(
 
 def _changed(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
     """Make a design of flat panels in the way that was asked for."""
+    if _is_gored(given, settings):
+        allowed = settings.distance(given.mesh.diagonal)
+        one = _of_search(given, given.mesh, settings, allowed, say, workers, gored=True)
+        return _checked(one, settings)
     if settings.formulation == "ruled":
         return _strips(given, settings, say, workers)
     if settings.formulation == "flatten":
         return _as_it_is(given, settings, say)
     return _nearly(given, settings, say, workers)
+
+
+def _is_gored(given: Design, settings: FabricationSettings) -> bool:
+    """Tell whether a design is made of gores: bodies of revolution with symmetric seams."""
+    if settings.formulation == "flatten" or not settings.symmetric:
+        return False
+    if given.constraints or any(map(len, (given.kept, given.along, given.avoid))):
+        return False
+    # This imports SciPy.
+    from gso.seams.gores import is_gored
+
+    return is_gored(given.mesh, settings.distance(given.mesh.diagonal))
 
 
 def _mixed(
@@ -303,6 +320,7 @@ def _of_search(
     allowed: float | None,
     say: Say,
     workers: int | None,
+    gored: bool = False,
 ) -> Made:
     """Search for seams within a distance, and make a panel of each piece."""
     from gso.seams import pieces as search
@@ -320,7 +338,8 @@ def _of_search(
         as_it_is=False,
         workers=workers,
         callback=say,
-        **asked.keywords(mesh, searched),
+        # Constraints are on the vertices of the design.
+        **asked.keywords(mesh, searched, gores=not given.constraints),
     )
     if given.constraints and allowed is not None:
         say("constraints")
@@ -331,7 +350,10 @@ def _of_search(
         raise MeshError(f"{given.name}: a piece cannot be laid flat; {said}")
     bound = None if allowed is None else settings.distance(given.mesh.diagonal)
     record = measurements.of_pattern(given.mesh, found.design, pattern, settings, bound)
-    one = of_surface(given.name, found.design, pattern, record | {"pieces": len(found)})
+    record |= {"pieces": len(found)}
+    one = of_surface(given.name, found.design, pattern, record, found.folded)
+    if gored and len(found.alike()) == 1:
+        one = replace(one, matings=alike(one.matings))
     return _bent(replace(one, reasons=found.reasons))
 
 

@@ -120,6 +120,16 @@ def numbered(matings: Sequence[Mating]) -> tuple[Mating, ...]:
     return tuple(replace(matings[k], number=number) for number, k in enumerate(order, start=1))
 
 
+def alike(matings: Sequence[Mating]) -> tuple[Mating, ...]:
+    """Mark the seams of parts that are all alike: between two of them, or of one with itself.
+
+    The mark is the number of the first seam of the kind.
+    """
+    first: dict[bool, int] = {}
+    kinds = [first.setdefault(m.one.panel == m.two.panel, m.number) for m in matings]
+    return tuple(replace(one, kind=kind) for one, kind in zip(matings, kinds, strict=True))
+
+
 def _directed(pattern: Pattern, seams: Ints) -> list[bool]:
     """Tell whether the faces of the first copy of each seam edge lie to its left."""
     # The faces of a flat image may have no area there.

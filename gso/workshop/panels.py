@@ -136,6 +136,9 @@ class Mating:
     angle : float
         Angle between the faces on both sides in radians, positive for mountain folds, 0 where the
         surface is smooth; infinite where it changes along the seam, and NaN where it is not known.
+    kind : int
+        Number on its notches, where parts are alike and every seam of a kind fits every other; 0
+        where notches have the number of the seam.
     """
 
     number: int
@@ -144,6 +147,7 @@ class Mating:
     two: Side
     common: bool = True
     angle: float = np.nan
+    kind: int = 0
 
     @property
     def length(self) -> float:
@@ -204,6 +208,7 @@ class Made:
         out["seam_along"] = np.concatenate([np.empty(0), *(seam.along for seam in seams)])
         out["seam_number"] = np.array([seam.number for seam in seams], np.int64)
         out["seam_common"] = np.array([int(seam.common) for seam in seams], np.int64)
+        out["seam_kind"] = np.array([seam.kind for seam in seams], np.int64)
         out["seam_angle"] = np.array([seam.angle for seam in seams], float)
         for k, name in enumerate(("one", "two")):
             own = [pair[k] for pair in sides]
@@ -233,8 +238,8 @@ class Made:
                 lines = (bends, turns, radii, zone, known)
                 panels.append(Panel(str(own), surface, flat, *lines, tuple(faces), is_kept))
             stops = np.cumsum(data["seam_count"])[:-1]
-            numbers, common, angles = (
-                data[f"seam_{part}"].tolist() for part in ("number", "common", "angle")
+            numbers, common, angles, kinds = (
+                data[f"seam_{part}"].tolist() for part in ("number", "common", "angle", "kind")
             )
             both = [
                 map(
@@ -246,13 +251,14 @@ class Made:
                 for side in ("one", "two")
             ]
             matings = [
-                Mating(number, along, one, two, bool(is_common), angle)
-                for number, along, one, two, is_common, angle in zip(
+                Mating(number, along, one, two, bool(is_common), angle, kind)
+                for number, along, one, two, is_common, angle, kind in zip(
                     numbers,
                     np.split(data["seam_along"], stops),
                     *both,
                     common,
                     angles,
+                    kinds,
                     strict=False,
                 )
             ]

@@ -51,6 +51,8 @@ class Joint:
         Whether it is the side that gets tabs.
     angle : float
         Angle between the faces on both sides, as that of a :class:`Mating`.
+    mark : str
+        Text of its notches.
     """
 
     number: int
@@ -59,6 +61,7 @@ class Joint:
     length: float
     first: bool
     angle: float
+    mark: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +232,8 @@ def _joint(panel: Panel, seam: Mating, side: Side, scale: float, first: bool) ->
         along = arc_lengths(line) - np.interp(0.5 * length, along, own) + 0.5 * length
     if not first:
         line, along = line[::-1], length - along[::-1]
-    return Joint(seam.number, line, along, length, first, seam.angle)
+    mark = str(seam.kind or seam.number)
+    return Joint(seam.number, line, along, length, first, seam.angle, mark)
 
 
 def _outline(panel: Panel, side: Side) -> tuple[Array, Array]:
@@ -285,7 +289,7 @@ def _notches(joint: Joint, spacing: float) -> list[Notch]:
     points = joint.line[k] + share[:, None] * way
     inward = np.stack([-way[:, 1], way[:, 0]], axis=1)
     inward /= np.maximum(np.linalg.norm(inward, axis=1, keepdims=True), 1e-300)
-    return [Notch(p, n, str(joint.number)) for p, n in zip(points, inward, strict=True)]
+    return [Notch(p, n, joint.mark) for p, n in zip(points, inward, strict=True)]
 
 
 def _registered(

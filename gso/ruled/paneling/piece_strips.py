@@ -265,7 +265,7 @@ def found_pieces(light: LightDesign, request: StripsRequest) -> Segmentation:
         as_it_is=False,
         workers=request.workers,
         callback=request.say,
-        **request.seams.keywords(light.mesh, mesh),
+        **request.seams.keywords(light.mesh, mesh, gores=False),
     )
     if any(sheet is None for sheet in found.sheets):
         raise MeshError(f"a piece cannot be laid flat; {'; '.join(map(str, found.reasons))}")
