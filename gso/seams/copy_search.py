@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from gso import geometry
 from gso.cut_pieces import Pieces
 from gso.geometry.plane import Plane
-from gso.mesh.topology import edge_keys, label_components, pair_keys
+from gso.mesh.topology import edge_keys, pair_keys
 from gso.seams.candidates import disks
 from gso.seams.carrying import base_fields
 from gso.seams.coarse_copy import CoarseCopy
@@ -49,8 +49,6 @@ _CORNER = 4
 _SMALL = 0.08
 #: Area of a region over the whole below which it always goes to a neighbour.
 _TINY = 0.003
-#: Area over the whole from which on what creases enclose is a feature.
-_FEATURE = 0.01
 #: Number of patches of regions that are divided.
 _FINER = 200
 #: Share of faces that seams should avoid from which on these regions are divided all the same.
@@ -188,26 +186,6 @@ class CopySearch:
     def fair(self, label: Ints, width: float) -> Ints:
         """Make the boundaries of regions fair that nearly are."""
         return self.regions.fair(label, width, rounds=1)
-
-    def featured(self) -> tuple[CopySearch, int]:
-        """Return a search that cuts along creases which enclose features, and how many these are.
-
-        A feature is a part of the surface, such as a nose, that creases divide from the others.
-        """
-        copy, regions = self.copy, self.base_regions
-        mesh, he = copy.base, copy.base.half_edges
-        n, k = len(mesh.vertices), he.interior
-        sides = he.face[k], he.face[he.twin[k]]
-        crossed = np.isin(edge_keys(he.origin[k], he.dest[k], n), pair_keys(copy.creases, n))
-        part = label_components(len(mesh.faces), *(side[~crossed] for side in sides))
-        share = np.bincount(part, regions.face_area) / regions.face_area.sum()
-        large = share[part] >= _FEATURE
-        one, two = sides
-        between = crossed & (part[one] != part[two]) & large[one] & large[two]
-        edges = np.stack([he.origin[k[between]], he.dest[k[between]]], axis=1)
-        wanted = replace(copy.wanted, kept=np.concatenate([copy.wanted.kept, edges]))
-        found = replace(self, copy=replace(copy, wanted=wanted))
-        return found, int((share >= _FEATURE).sum()) - len(np.unique(mesh.components[mesh.used]))
 
     def value(self, label: Ints) -> tuple[int, float, float]:
         """Rank regions by their number and the length of their boundaries."""

@@ -29,7 +29,7 @@ class Corrections:
 
     Vertices from which the surface is too far away are drawn towards their own points of the
     design, and so are those of parts that have come to pass through each other. Where the design
-    passes through itself, both parts are drawn inwards.
+    passes through itself, or that does not help, both parts are drawn inwards.
 
     Parameters
     ----------
@@ -43,7 +43,8 @@ class Corrections:
         self._design, self._distance = pieces.design, distance
         #: How often each vertex was too far away.
         self._often: Ints = np.zeros(len(self._design.vertices), np.int64)
-        self._inwards = self._often.copy()
+        #: How often each vertex was part of a crossing, and was drawn inwards for it.
+        self._through, self._inwards = self._often.copy(), self._often.copy()
         self._own: Flags = self._often > 0
         #: What draws them.
         self.constraints: list[Handle] = []
@@ -77,6 +78,9 @@ class Corrections:
         before[self._design.faces[np.unique(faults.crossings(self._design))]] = True
         now = np.zeros(len(self._often), bool)
         now[surface.faces[faces]] = True
-        self._inwards[now & before] += 1
-        self._often[now & ~before] += 1
-        self._own |= now & ~before
+        self._through[now] += 1
+        # Faces beside those that cross in the design may cross, too.
+        inwards = now & (before | (self._through > 1))
+        self._inwards[inwards] += 1
+        self._often[now & ~inwards] += 1
+        self._own[now] = ~inwards[now]

@@ -19,6 +19,7 @@ from gso.seams.budgets import Budgets
 from gso.seams.carrying import base_start
 from gso.seams.coarse_copy import CoarseCopy
 from gso.seams.copy_search import LEVELS, CopySearch
+from gso.seams.crease_lines import feature_edges
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
@@ -34,10 +35,15 @@ _FEW, _LITTLE = 0.4, 1.5
 #: Excess up to which a first solve of a division is repaired.
 _NEARLY = 1.15
 #: Excess of all of some divisions from which on others with as many pieces are not tried.
-_FAR, _ENOUGH = 2.0, 3
+_FAR, _ENOUGH = 2.3, 3
+#: How often a division is solved again from where it is, and the largest ratio of its excess.
+_PURSUITS, _LESS = 3, 0.97
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
 _HOPELESS, _MANY = 20.0, 150
-#: Number of pieces that seams along the creases around each feature may cost.
+#: Gaps in creases over the distance that are closed, and number of pieces for each feature from
+#: which on seams along its creases are tried.
+_GAP, _FEW_FEATURES = 6.0, 3
+#: Number of pieces that these may cost for each feature.
 _FOR_CREASES = 2
 #: Iterations of the solve of the design, from the shape of the copy.
 _ITERATIONS = 16
@@ -75,19 +81,24 @@ def divided_within(
     allowed = Allowed(design, settings.max_deviation, settings.max_strain)
     copy = CoarseCopy.of(design, allowed.distance, wanted)
     search = CopySearch(copy, allowed, settings, plane)
-    return _of_design(*_along_creases(search, _of_copy(search)))
+    return _of_design(*_along_creases(search, wanted, _of_copy(search)))
 
 
-def _along_creases(search: CopySearch, trials: list[Trial]) -> tuple[CopySearch, list[Trial]]:
+def _along_creases(
+    search: CopySearch, wanted: Wanted | None, trials: list[Trial]
+) -> tuple[CopySearch, list[Trial]]:
     """Search again for seams along creases around features, such as a nose.
 
     They are taken if that costs little.
     """
-    best = trials[-1]
-    along, features = search.featured()
-    if not best.holds or not 0 < features <= len(best.pieces):
+    best, allowed = trials[-1], search.allowed
+    edges, features = feature_edges(allowed.design, _GAP * allowed.distance)
+    if not best.holds or not 0 < features <= max(1, len(best.pieces) // _FEW_FEATURES):
         return search, trials
     search.settings.say(f"seams along the creases around features: {features}")
+    wanted = wanted or Wanted.nothing(allowed.design)
+    wanted = replace(wanted, kept=np.concatenate([wanted.kept, edges]))
+    along = replace(search, copy=CoarseCopy.of(allowed.design, allowed.distance, wanted))
     others = _of_copy(along)
     more = len(others[-1].pieces) - len(best.pieces)
     missing = [Budgets(some[-1], search.settings).missing for some in (others, trials)]
@@ -107,8 +118,8 @@ def _of_copy(search: CopySearch) -> list[Trial]:
         some = _first(search, labels[: effort.variants], others)
         if some and not some[-1].holds:
             best = min(some, key=lambda one: float(one.excess.max()))
-            if _NEARLY < best.excess.max() <= _LITTLE:
-                some.append(best := search.measured(best.label))
+            some += (more := _pursued(search, best))
+            best = min([best, *more], key=lambda one: float(one.excess.max()))
             some += _refined(search, best, others)
         found += some
         if any(one.holds for one in found) or (found and _hopeless(found[-1])):
@@ -147,6 +158,18 @@ def _first(search: CopySearch, labels: list[Ints], others: int) -> list[Trial]:
         far = min(float(one.excess.max()) for one in found) > _FAR
         if found[-1].holds or (far and number >= _ENOUGH):
             break
+    return found
+
+
+def _pursued(search: CopySearch, trial: Trial) -> list[Trial]:
+    """Solve a division again from where it is, as long as it needs less and less."""
+    found: list[Trial] = []
+    while len(found) < _PURSUITS and not trial.holds and trial.excess.max() <= _FAR:
+        search.remaining.of_copy(f"shape of {len(trial.pieces)} pieces", _PURSUITS - len(found))
+        found.append(search.measured(trial.label, trial.width, begin=trial))
+        if found[-1].excess.max() > _LESS * trial.excess.max():
+            break
+        trial = found[-1]
     return found
 
 

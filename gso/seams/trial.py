@@ -22,10 +22,12 @@ from gso.seams.joint_solve import solve_pieces
 from gso.seams.kinds import Edges
 from gso.seams.regions import Divided, with_flips
 from gso.seams.sheets import Sheet, laid
+from gso.seams.splitting import apart
 from gso.tasks.developable import Options
 from gso.tasks.request import Request
 from gso.tasks.start import Start
 from gso.typing import Array, Flags, Ints
+from gso.verdict import Code
 
 #: Share of the allowed distance beyond which the solver penalises it, and the weight of that.
 _REACH, _WEIGHT = 0.9, 5000.0
@@ -45,7 +47,11 @@ _FARTHER = 2.5
 _KNOWN = 200.0
 #: Distance that is then aimed at, factor on the weight of curvature, number of iterations, and the
 #: rounds in which vertices of folds move between their neighbours.
-_BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (2.0, 6.0), 12, 10
+_BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (1.2, 4.0), 12, 10
+#: How often a solve begins again from the design; the largest distance of a result after which it
+#: does, the factor on the weight of curvature where the strain is too large, and that where it is
+#: below some share of what is allowed, and the distance is too large.
+_COLD, _NEAR_ENOUGH, _MUCH_MORE, _LESS, _UNUSED = 3, 1.15, 8.0, 0.6, 0.3
 #: By how much points inside faces may be farther away than vertices.
 _INSIDE = 1.05
 #: Factor on the weight of distances beyond those that are aimed at, where they are too large.
@@ -54,6 +60,8 @@ _NEARER = 2.0
 _FAIRER, _SHARE_OF_FOLDS = (2.5, 8.0), 0.15
 #: Excess up to which little is missing.
 _CLOSE = 1.08
+#: Ratio of what a result needs to the least before, up to which it becomes much less.
+_PROGRESS = 0.8
 #: Angle in degrees from which on an edge of a folded face is flipped.
 _FOLDED = 90.0
 #: Share of the allowed distance from which on points inside faces are measured, too.
@@ -97,8 +105,10 @@ class Trial:
     distance, strain : ndarray, (p,)
         Largest distance of each piece from the design, and strain of its pattern, over what is
         allowed.
+    built : bool
+        Whether the pieces are to be built.
     crossed : ndarray of int
-        Faces that pass through others, where the surface is to be built.
+        Faces that pass through others, if they are.
     outward : float
         Largest distance of a vertex from the design over the allowed one.
     width : float
@@ -114,6 +124,7 @@ class Trial:
     sheets: tuple[Sheet | None, ...]
     distance: Array
     strain: Array
+    built: bool
     crossed: Ints
     outward: float
     width: float
@@ -134,9 +145,21 @@ class Trial:
         return self._number(self.folded)
 
     @cached_property
-    def overlaps(self) -> Ints:
-        """Number of pairs of faces that overlap in each pattern (p,)."""
-        return np.array([0 if one is None else len(one.overlaps) for one in self.sheets])
+    def slivers(self) -> Ints:
+        """Number of pairs of faces that overlap in patterns (p,) which lose too small parts for it.
+
+        Patterns of a copy, which is not to be built, may overlap.
+        """
+        out = np.zeros(len(self.sheets), np.int64)
+        if not self.built:
+            return out
+        least = (Code.SMALL.info.limit or 0.0) * metrics.area(self.shape.design)
+        for k, sheet in enumerate(self.sheets):
+            if sheet is not None and len(sheet.overlaps):
+                parts = cut(sheet.mesh, Edges(apart(sheet)))
+                if min(metrics.area(part.mesh) for part in parts) < least:
+                    out[k] = len(sheet.overlaps)
+        return out
 
     def _number(self, faces: Ints) -> Ints:
         """Count faces of each piece (p,)."""
@@ -155,8 +178,8 @@ class Trial:
             self.strain > 1.0, np.minimum(np.maximum(self.strain, 1.0) ** _ROOT, _MOST), 0.0
         )
         folds = np.where(self.folds > 0, _faulty(self.folds), 0.0)
-        overlaps = np.where(self.overlaps > 0, _faulty(self.overlaps), 0.0)
-        return np.asarray(np.max([self.distance, strain, folds, overlaps], axis=0))
+        slivers = np.where(self.slivers > 0, _faulty(self.slivers), 0.0)
+        return np.asarray(np.max([self.distance, strain, folds, slivers], axis=0))
 
     @property
     def holds(self) -> bool:
@@ -250,7 +273,8 @@ def tried(
     iterations : int, optional
         Number of iterations from there.
     repairs : int
-        How often a result that nearly holds is solved again; twice as often if little is missing.
+        How often a result that nearly holds is solved again; twice as often if little is missing,
+        or what is missing becomes much less.
     executor : Executor
         Lays pieces flat; the result does not depend on it.
     width : float
@@ -264,6 +288,7 @@ def tried(
     if options is not None:
         own = replace(options, reach=own.reach)
     found: list[Trial] = []
+    needs: list[float] = []
     corrections = Corrections(pieces, allowed.distance)
     if start is not None:
         corrections.measure(pieces.design.replaced(start))
@@ -276,17 +301,42 @@ def tried(
             result = None
         trial = _measured(label, divided, pieces, result, allowed, executor, width, own)
         found.append(trial)
-        if trial.holds or result is None or not _repairable(trial, known):
+        if trial.holds or result is None:
             break
-        if number == 0 and trial.excess.max() > most:
+        cold = start is None and number < _COLD
+        again = _begun_again(own, trial) if cold else None
+        if again is not None:
+            own = again
+            continue
+        if not _repairable(trial, known) or (start is None and trial.excess.max() > most):
             break
-        if number >= repairs and max(trial.distance.max(), trial.strain.max()) > _CLOSE:
+        needs.append(float(max(trial.distance.max(), trial.strain.max())))
+        if number >= repairs and needs[-1] > max(_CLOSE, _PROGRESS * min(needs[:-1], default=0.0)):
             break
         own = _stricter(own, trial)
         corrections.measure(trial.shape.design)
         start, iterations = trial.untangled, _AGAIN
         pieces = _with_flips(trial)
     return min(found, key=lambda one: float(one.excess.max()))
+
+
+def _begun_again(options: Options, trial: Trial) -> Options | None:
+    """Return settings with which a solve from the design may hold, where one from there nearly did.
+
+    None where that is not likely. A solve that goes on from a shape with other weights folds more
+    often than one that begins again.
+    """
+    far, strain = float(trial.distance.max()), float(trial.strain.max())
+    if far > _NEAR_ENOUGH or strain > _KNOWN or trial.folds.sum() > _SOME_FOLDS:
+        return None
+    if strain > 1.0:
+        return replace(options, w_curvature=_MUCH_MORE * options.w_curvature)
+    if far > 1.0 and options.reach is not None:
+        less = _LESS if strain < _UNUSED else 1.0
+        return replace(
+            options, reach=options.reach * _BELOW / far, w_curvature=less * options.w_curvature
+        )
+    return None
 
 
 def _repairable(trial: Trial, known: bool) -> bool:
@@ -337,7 +387,18 @@ def _measured(
     far, outward = _away(shape, allowed)
     crossed = np.unique(faults.crossings(shape.design)) if allowed.built else np.empty(0, np.int64)
     return Trial(
-        label, pieces, region, result, sheets, far, strain, crossed, outward, width, options
+        label,
+        pieces,
+        region,
+        result,
+        sheets,
+        far,
+        strain,
+        allowed.built,
+        crossed,
+        outward,
+        width,
+        options,
     )
 
 
