@@ -48,7 +48,7 @@ _CORNER = 4
 #: Area of a region over the mean, below which it goes to a neighbour at first.
 _SMALL = 0.08
 #: Area of a region over the whole below which it always goes to a neighbour.
-_TINY = 0.003
+TINY = 0.003
 #: Number of patches of regions that are divided.
 _FINER = 200
 #: Share of faces that seams should avoid from which on these regions are divided all the same.
@@ -202,7 +202,7 @@ class CopySearch:
         faces, length = self.beside
         while True:
             size = np.bincount(label, self.regions.face_area)
-            small = np.flatnonzero(size < max(share * size.mean(), _TINY * size.sum()))
+            small = np.flatnonzero(size < max(share * size.mean(), TINY * size.sum()))
             a, b = label[faces].T
             for own in small[np.argsort(size[small], kind="stable")].tolist():
                 out, back = (
@@ -232,11 +232,12 @@ class CopySearch:
         fields = regions.fields(label, width)
         if self.mirror is not None:
             fields = self.mirror.symmetric(fields, self.mirror.partners(label))
-        divided = regions.cut_between(fields)
+        kept = self.copy.wanted_of_copy.kept
+        divided = regions.cut_between(fields).along(kept, TINY)
         return tried(
             label,
             divided,
-            self.opened(divided, self.copy.wanted_of_copy.kept, self.apexes),
+            self.opened(divided, kept, self.apexes),
             self.of_copy,
             None if begin is None else divided.moved(begin.untangled[: len(regions.mesh.vertices)]),
             _ITERATIONS,

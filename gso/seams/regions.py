@@ -67,6 +67,32 @@ class Divided(NamedTuple):
         """Return edges for lines (k, 2) of the mesh that was divided."""
         return followed(lines, self.ends, len(self.mesh.vertices) - len(self.ends))
 
+    def along(self, lines: Ints, least: float) -> Divided:
+        """Move boundaries to lines (k, 2) of the mesh that was divided, close to which they run.
+
+        What is between both, and less than the `least` share of the area, goes to the region on the
+        other side of the boundary.
+        """
+        if not len(lines):
+            return self
+        mesh, he, label = self.mesh, self.mesh.half_edges, self.label.copy()
+        n, k = len(mesh.vertices), he.interior
+        f, g = he.face[k], he.face[he.twin[k]]
+        fixed = np.isin(
+            edge_keys(he.origin[k], he.dest[k], n), pair_keys(np.sort(self.lines(lines)), n)
+        )
+        same = ~fixed & (label[f] == label[g])
+        part = label_components(len(mesh.faces), f[same], g[same])
+        area = np.linalg.norm(geometry.area_vectors(mesh.vertices, mesh.faces), axis=1)
+        small = np.bincount(part, area)[part] < least * area.sum()
+        across = ~fixed & (label[f] != label[g])
+        f, g = np.r_[f[across], g[across]], np.r_[g[across], f[across]]
+        some = small[f] & ~small[g]
+        other = np.full(int(part.max()) + 1, -1)
+        other[part[f[some]]] = label[g[some]]
+        label[small] = np.where(other[part[small]] >= 0, other[part[small]], label[small])
+        return self._replace(label=label)
+
 
 @dataclass(frozen=True, eq=False)
 class Regions:

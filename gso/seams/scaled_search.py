@@ -18,7 +18,7 @@ from gso.mesh import Mesh
 from gso.seams.budgets import Budgets
 from gso.seams.carrying import base_start
 from gso.seams.coarse_copy import CoarseCopy
-from gso.seams.copy_search import LEVELS, CopySearch
+from gso.seams.copy_search import LEVELS, TINY, CopySearch
 from gso.seams.crease_lines import feature_edges
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
@@ -40,9 +40,8 @@ _FAR, _ENOUGH = 2.3, 3
 _PURSUITS, _LESS = 3, 0.97
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
 _HOPELESS, _MANY = 20.0, 150
-#: Gaps in creases over the distance that are closed, and number of pieces for each feature from
-#: which on seams along its creases are tried.
-_GAP, _FEW_FEATURES = 6.0, 3
+#: Number of pieces for each feature from which on seams along its creases are tried.
+_FEW_FEATURES = 3
 #: Number of pieces that these may cost for each feature.
 _FOR_CREASES = 2
 #: Iterations of the solve of the design, from the shape of the copy.
@@ -92,7 +91,7 @@ def _along_creases(
     They are taken if that costs little.
     """
     best, allowed = trials[-1], search.allowed
-    edges, features = feature_edges(allowed.design, _GAP * allowed.distance)
+    edges, features = feature_edges(allowed.design)
     if not best.holds or not 0 < features <= max(1, len(best.pieces) // _FEW_FEATURES):
         return search, trials
     search.settings.say(f"seams along the creases around features: {features}")
@@ -252,7 +251,7 @@ def _carried(search: CopySearch, trial: Trial, begin: Trial | None) -> Trial:
     """
     copy = search.copy
     fields = search.base_fields(trial.label, trial.width)
-    divided = search.base_regions.cut_between(fields)
+    divided = search.base_regions.cut_between(fields).along(copy.wanted.kept, TINY)
     smooth = search.opened(divided, copy.wanted.kept, search.base_apexes)
     if begin is None:
         start = base_start(copy, trial, smooth)

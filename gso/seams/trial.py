@@ -287,7 +287,7 @@ def tried(
     own, known = options_for(allowed.distance), start is not None
     if options is not None:
         own = replace(options, reach=own.reach)
-    found: list[Trial] = []
+    first, found = start, list[Trial]()
     needs: list[float] = []
     corrections = Corrections(pieces, allowed.distance)
     if start is not None:
@@ -303,8 +303,9 @@ def tried(
         found.append(trial)
         if trial.holds or result is None:
             break
-        cold = start is None and number < _COLD
-        again = _begun_again(own, trial) if cold else None
+        # As long as it has not gone on from its own shape.
+        fresh = start is first and number < (_COLD if first is None else 1)
+        again = _begun_again(own, trial) if fresh else None
         if again is not None:
             own = again
             continue
