@@ -212,7 +212,8 @@ class Regions:
         tied = np.flatnonzero(second >= 0)
         fields[tied, second[tied]] = fields[tied, best[tied]]
         label = connected(finer, self._labels(finer.faces, owner, fields, ends, place))
-        return Divided(_without_ears(finer, label), label, ends, place)
+        out = Divided(finer, label, ends, place)
+        return out._replace(mesh=_without_ears(finer, label, out.lines(self.creases)))
 
     def _labels(self, faces: Ints, owner: Ints, fields: Array, ends: Ints, shares: Array) -> Ints:
         """Return the region with the largest value in each part of a triangle."""
@@ -236,15 +237,19 @@ class Regions:
         return np.asarray(value.argmax(axis=1))
 
 
-def _without_ears(mesh: Mesh, label: Ints) -> Mesh:
-    """Flip the inner edge of triangles with two sides on seams, which could fold freely."""
-    he = mesh.half_edges
+def _without_ears(mesh: Mesh, label: Ints, creases: Ints) -> Mesh:
+    """Flip the inner edge of triangles with two sides on seams, which could fold freely.
+
+    Creases (k, 2) stay.
+    """
+    he, n = mesh.half_edges, len(mesh.vertices)
     inside = he.twin >= 0
     inside[inside] = label[he.face[inside]] == label[he.face[he.twin[inside]]]
     number = np.bincount(he.face[inside], minlength=len(mesh.faces))
     k = np.flatnonzero(inside & (number[he.face] == 1))
     k = k[number[he.face[he.twin[k]]] > 1]
-    return with_flips(mesh, k)
+    own = edge_keys(he.origin[k], he.dest[k], n)
+    return with_flips(mesh, k[~np.isin(own, pair_keys(np.sort(creases), n))])
 
 
 def with_flips(mesh: Mesh, half_edges: Ints) -> Mesh:

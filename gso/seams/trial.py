@@ -17,6 +17,7 @@ from gso.result import Result
 from gso.seams.candidates import Candidate
 from gso.seams.corrections import Corrections
 from gso.seams.cutting import cut
+from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.inverted_faces import inverted_at_seams
 from gso.seams.joint_solve import solve_pieces
 from gso.seams.kinds import Edges
@@ -52,6 +53,8 @@ _BELOW, _MORE, _AGAIN, _ROUNDS = 0.98, (1.2, 4.0), 12, 10
 #: does, the factor on the weight of curvature where the strain is too large, and that where it is
 #: below some share of what is allowed, and the distance is too large.
 _COLD, _NEAR_ENOUGH, _MUCH_MORE, _LESS, _UNUSED = 3, 1.15, 8.0, 0.6, 0.3
+#: Factor on the weight of fairness where that of curvature grows much, or where there are facets.
+_SMOOTHER = 2.5
 #: By how much points inside faces may be farther away than vertices.
 _INSIDE = 1.05
 #: Factor on the weight of distances beyond those that are aimed at, where they are too large.
@@ -179,7 +182,13 @@ class Trial:
         )
         folds = np.where(self.folds > 0, _faulty(self.folds), 0.0)
         slivers = np.where(self.slivers > 0, _faulty(self.slivers), 0.0)
-        return np.asarray(np.max([self.distance, strain, folds, slivers], axis=0))
+        facets = np.full(len(self.region), self.facets if self.facets > 1.0 else 0.0)
+        return np.asarray(np.max([self.distance, strain, folds, slivers, facets], axis=0))
+
+    @cached_property
+    def facets(self) -> float:
+        """Mean angle between faces inside pieces over that of a design which counts as smooth."""
+        return 0.0 if self.result is None else facet_ratio(self.result) / FACETS
 
     @property
     def holds(self) -> bool:
@@ -331,7 +340,11 @@ def _begun_again(options: Options, trial: Trial) -> Options | None:
     if far > _NEAR_ENOUGH or strain > _KNOWN or trial.folds.sum() > _SOME_FOLDS:
         return None
     if strain > 1.0:
-        return replace(options, w_curvature=_MUCH_MORE * options.w_curvature)
+        return replace(
+            options,
+            w_curvature=_MUCH_MORE * options.w_curvature,
+            w_fairness=_SMOOTHER * options.w_fairness,
+        )
     if far > 1.0 and options.reach is not None:
         less = _LESS if strain < _UNUSED else 1.0
         return replace(
@@ -364,6 +377,8 @@ def _stricter(options: Options, trial: Trial) -> Options:
     if trial.folds.any():
         fairer = float(np.clip(_SHARE_OF_FOLDS * trial.folds.sum(), *_FAIRER))
         options = replace(options, w_fairness=fairer * options.w_fairness)
+    elif trial.facets > 1.0:
+        options = replace(options, w_fairness=_SMOOTHER * options.w_fairness)
     if strain > 1.0:
         more = float(np.clip(strain, *_MORE))
         options = replace(options, w_curvature=more * options.w_curvature)
