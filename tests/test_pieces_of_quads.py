@@ -55,7 +55,7 @@ def test_where_rows_are_no_good_seams_cross_faces():
     # The fair seams of a saddle run across the rows.
     y, x = np.mgrid[-1:1:33j, -1:1:33j]
     saddle = Mesh.from_grid(np.dstack([x, y, 0.35 * (x * x - y * y)]))
-    out = gso.pieces(saddle, max_deviation="1.75%", workers=0, effort="draft")
+    out = gso.pieces(saddle, max_deviation="2.5%", workers=0, effort="draft")
     assert out.usable and out.design.is_triangles
     assert any("seams cross faces" in note for note in out.notes)
 
