@@ -314,6 +314,8 @@ def tried(
             break
         # As long as it has not gone on from its own shape.
         fresh = start is first and number < (_COLD if first is None else 1)
+        # Where it began with a shape, that is as far as the distance alone is missing.
+        fresh &= first is None or bool(trial.strain.max() <= 1.0)
         again = _begun_again(own, trial) if fresh else None
         if again is not None:
             own = again
