@@ -63,9 +63,7 @@ def within(
     """
     rows: _Rows = {}
     for name, mesh in _designs(files, shapes, "within"):
-        far = 0.01 * float(share) * mesh.diagonal
-        asked = {"max_strain": _WHOLE, "max_deviation": far, "effort": effort}
-        found = quietly(gso.pieces, mesh, **asked)
+        found = _found(mesh, mesh.diagonal, share, effort)
         row = _of_found(found, 100.0 / mesh.diagonal)
         areas = [part.area for part in found.parts]
         rows[name] = {
@@ -94,9 +92,7 @@ def perturbed(
     """
     rows: _Rows = {}
     for name, mesh in _designs(files, shapes, "perturbed"):
-        asked = {"max_strain": _WHOLE, "effort": effort}
-        asked["max_deviation"] = 0.01 * float(share) * mesh.diagonal
-        found = [quietly(gso.pieces, one, **asked) for one in variants(mesh, runs)]
+        found = [_found(one, mesh.diagonal, share, effort) for one in variants(mesh, runs)]
         figures = {
             "pieces": [len(one) for one in found],
             "seam": [one.seam_length for one in found],
@@ -126,8 +122,7 @@ def peers(
     """
     rows: _Rows = {}
     for name, mesh in _designs(files, shapes, "peers"):
-        far = 0.01 * float(share) * mesh.diagonal
-        found = quietly(gso.pieces, mesh, max_strain=_WHOLE, max_deviation=far, effort=effort)
+        found = _found(mesh, mesh.diagonal, share, effort)
         kept = quietly(gso.pieces, mesh, max_strain=float(strain))
         kinds: _Rows = {}
         for kind, one in ((f"within {share} %", found), (f"as is, strain {strain}", kept)):
@@ -230,6 +225,12 @@ def times() -> dict[str, Any]:
         )
         rows[str(len(mesh.faces))] = row
     return tabulate("times", ["triangles"], rows)
+
+
+def _found(mesh: Mesh, size: float, share: str, effort: str) -> gso.seams.Segmentation:
+    """Cut a design whose shape may change within a share (%) of a size."""
+    far = 0.01 * float(share) * size
+    return quietly(gso.pieces, mesh, max_strain=_WHOLE, max_deviation=far, effort=effort)
 
 
 def _figures(mesh: Mesh, **given: Any) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from gso.mesh import Mesh
 from gso.mesh.separation import centres
-from gso.mesh.topology import edge_graph, edge_keys, pair_keys
+from gso.mesh.topology import edge_graph
 from gso.typing import Ints
 
 
@@ -17,10 +17,9 @@ def patches(mesh: Mesh, count: int, kept: Ints) -> Ints:
     The Voronoi cells of farthest points, by distances between the centres of faces. No patch
     reaches across an edge of `kept` (k, 2).
     """
-    he, n = mesh.half_edges, len(mesh.vertices)
+    he = mesh.half_edges
     k = he.interior
-    cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), pair_keys(kept, n))
-    k = k[~cut]
+    k = k[~he.on(kept)[k]]
     centre = centres(mesh)
     f, g = he.face[k], he.face[he.twin[k]]
     length = np.linalg.norm(centre[f] - centre[g], axis=1)

@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gso import geometry
+from gso import metrics
 from gso.cut_pieces import Pieces
 from gso.geometry.plane import Plane
-from gso.mesh.topology import edge_keys, pair_keys
 from gso.seams.candidates import disks
 from gso.seams.carrying import base_fields
 from gso.seams.coarse_copy import CoarseCopy
@@ -25,7 +24,8 @@ from gso.seams.regions import Divided, Regions, numbered
 from gso.seams.remaining_time import RemainingTime
 from gso.seams.symmetry import Mirror
 from gso.seams.tree import Ground
-from gso.seams.trial import Allowed, Trial, tried
+from gso.seams.trial import Allowed, Trial
+from gso.seams.trial_solve import tried
 from gso.typing import Array, Flags, Ints
 
 #: Share of what is allowed that pieces of the copy may use.
@@ -100,10 +100,8 @@ class CopySearch:
     @cached_property
     def joinable(self) -> Flags:
         """Whether each inner edge (e,) of the copy may vanish, and is not cut in any case."""
-        mesh, he = self.copy.mesh, self.copy.mesh.half_edges
-        own = edge_keys(he.origin[he.interior], he.dest[he.interior], len(mesh.vertices))
-        kept = self.copy.wanted_of_copy.kept
-        return ~np.isin(own, pair_keys(kept, len(mesh.vertices)))
+        he = self.copy.mesh.half_edges
+        return ~he.on(self.copy.wanted_of_copy.kept)[he.interior]
 
     def neighbours(self, label: Ints) -> Ints:
         """Return the pairs (p, 2) of regions with a common boundary, none of it to be cut."""
@@ -329,15 +327,14 @@ class CopySearch:
         There a developable piece around both sides is folded. The sides are those by the normals of
         faces, in the direction in which these differ most. Other faces keep their new region.
         """
-        vectors = geometry.area_vectors(self.copy.mesh.vertices, self.copy.mesh.faces)
+        new, area = new.copy(), self.regions.face_area
+        normals = metrics.face_normals(self.copy.mesh)
         for own in np.flatnonzero(some):
             inside = label == own
-            size = np.linalg.norm(vectors[inside], axis=1)
-            normal = vectors[inside] / np.maximum(size, 1e-300)[:, None]
+            size, normal = area[inside], normals[inside]
             mean = size @ normal / size.sum()
             spread = (normal - mean).T @ (size[:, None] * (normal - mean))
             side = (normal - mean) @ np.linalg.eigh(spread)[1][:, -1] > 0.0
-            new = new.copy()
             new[inside] = int(new.max()) + 1 + side
         return numbered(new)
 

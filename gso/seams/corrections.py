@@ -7,6 +7,8 @@ other.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from gso import faults
@@ -49,14 +51,17 @@ class Corrections:
         #: What draws them.
         self.constraints: list[Handle] = []
 
-    def measure(self, surface: Mesh) -> None:
-        """Add the vertices that are wrong on a surface, which is the design after a solve."""
+    def measure(self, surface: Mesh, crossed: Ints) -> None:
+        """Add the vertices that are wrong on a surface, which is the design after a solve.
+
+        Some faces of it pass through others.
+        """
         design = self._design
         _, _, feet = Nearest(surface).locate(design.vertices)
         away = feet - design.vertices
         size = np.linalg.norm(away, axis=1) / self._distance
         self._often[(size > _FROM) & design.used] += 1
-        self._crossed(surface)
+        self._add(np.isin(np.arange(len(size)), surface.faces[crossed]))
         share = np.minimum(1.0, _TO / np.maximum(size, 1e-300))
         share[self._own] = 0.0
         target = design.vertices + share[:, None] * away
@@ -70,17 +75,19 @@ class Corrections:
             for k in np.unique(power).tolist()
         ]
 
-    def _crossed(self, surface: Mesh) -> None:
-        faces = np.unique(faults.crossings(surface))
-        if not len(faces):
+    @cached_property
+    def _before(self) -> Flags:
+        """The vertices of faces that cross in the design."""
+        faces = self._design.faces[np.unique(faults.crossings(self._design))]
+        return np.isin(np.arange(len(self._often)), faces)
+
+    def _add(self, now: Flags) -> None:
+        """Add the vertices of faces that cross."""
+        if not now.any():
             return
-        before = np.zeros(len(self._often), bool)
-        before[self._design.faces[np.unique(faults.crossings(self._design))]] = True
-        now = np.zeros(len(self._often), bool)
-        now[surface.faces[faces]] = True
         self._through[now] += 1
         # Faces beside those that cross in the design may cross, too.
-        inwards = now & (before | (self._through > 1))
+        inwards = now & (self._before | (self._through > 1))
         self._inwards[inwards] += 1
         self._often[now & ~inwards] += 1
         self._own[now] = ~inwards[now]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gso import metrics
-from gso.geometry import area_vectors
+from gso.geometry import doubled_areas
 from gso.mesh import Mesh
-from gso.mesh.topology import edge_keys, label_components, pair_keys
-from gso.seams.kinds import Creases
+from gso.mesh.topology import label_components
+from gso.seams.kinds import Creases, edges_between
 from gso.typing import Ints
 
 #: Angle between faces, in degrees, from which on an edge is a crease, and from which on it may be
@@ -59,18 +59,16 @@ def feature_edges(mesh: Mesh) -> tuple[Ints, int]:
     >>> edges.tolist(), count
     ([[2, 7], [7, 12]], 1)
     """
-    strong, weak = crease_lines(mesh, 0.0), np.sort(Creases(_WEAK).edges(mesh), axis=1)
-    n, he = len(mesh.vertices), mesh.half_edges
-    line = label_components(n, weak[:, 0], weak[:, 1])
-    weak = weak[np.isin(line[weak[:, 0]], line[strong])]
+    he, angle = mesh.half_edges, metrics.dihedral_angles(mesh)
     k = he.interior
-    one, two = he.face[k], he.face[he.twin[k]]
-    crossed = np.isin(edge_keys(he.origin[k], he.dest[k], n), pair_keys(weak, n))
+    one, two, weak = he.face[k], he.face[he.twin[k]], angle > _WEAK
+    line = label_components(len(mesh.vertices), he.origin[k[weak]], he.dest[k[weak]])
+    # Weak ones that go on a strong one.
+    crossed = weak & np.isin(line[he.origin[k]], line[crease_lines(mesh, 0.0)])
     part = label_components(len(mesh.faces), one[~crossed], two[~crossed])
-    area = np.linalg.norm(area_vectors(mesh.vertices, mesh.triangles), axis=1)
+    area = doubled_areas(mesh.vertices, mesh.triangles)
     large = np.bincount(part, area) >= _FEATURE * area.sum()
     part = np.where(large[part], part, -1)
-    angle = metrics.dihedral_angles(mesh)
     f, g, turn = np.r_[one, two], np.r_[two, one], np.r_[angle, angle]
     while True:
         front = np.flatnonzero((part[f] >= 0) & (part[g] < 0))
@@ -79,7 +77,6 @@ def feature_edges(mesh: Mesh) -> tuple[Ints, int]:
         front = front[np.lexsort([turn[front], g[front]])]
         first = np.r_[True, np.diff(g[front]) > 0]
         part[g[front[first]]] = part[f[front[first]]]
-    between = part[one] != part[two]
-    edges = np.sort(np.stack([he.origin[k[between]], he.dest[k[between]]], axis=1), axis=1)
+    edges = np.sort(edges_between(mesh, part), axis=1)
     bodies = len(np.unique(mesh.components[mesh.used]))
     return edges[np.lexsort(edges.T[::-1])], max(int(large.sum()) - bodies, 0)

@@ -27,7 +27,8 @@ from gso.seams.regions import Divided, Regions, connected, numbered
 from gso.seams.sheets import flattened
 from gso.seams.symmetry import Mirror
 from gso.seams.tree import Ground
-from gso.seams.trial import Allowed, Trial, tried
+from gso.seams.trial import Allowed, Trial
+from gso.seams.trial_solve import tried
 from gso.typing import Array, Ints
 
 #: Largest distance of a seam from the fair one, and factor on what an edge costs for the square of
@@ -83,9 +84,9 @@ def rows_or_triangles(
         found.append(_solved(label, pieces, trial, smooth, settings))
         if found[-1].holds:
             break
-    rows = min(found, key=lambda one: float(one.excess.max()))
+    rows = min(found, key=lambda one: one.worst)
     if not trial.holds:
-        return rows if rows.excess.max() <= trial.excess.max() else trial
+        return rows if rows.worst <= trial.worst else trial
     within = Budgets(rows, settings).missing <= Budgets(trial, settings).missing
     return rows if rows.holds and _short(rows.shape, trial.shape) and within else trial
 

@@ -184,8 +184,7 @@ def in_gores(design: Mesh, body: Revolution, settings: PieceSettings) -> Segment
         None if that would be too many, or if the profile is straight, so that one piece may do.
         What does not hold besides is a reason against the result.
     """
-    allowed = np.inf if settings.max_deviation is None else settings.max_deviation
-    gores = fewest(design, body, settings) if bent(body, allowed) else None
+    gores = _fewest(design, body, settings) if bent(body, settings.allowed) else None
     if gores is None:
         return None
     out = packed(gores.candidate(), None, design, _NO_EDGES, settings, rebuilt=True)
@@ -223,25 +222,12 @@ def advised(body: Revolution, allowed: float) -> str:
     )
 
 
-def fewest(design: Mesh, body: Revolution, settings: PieceSettings) -> Gores | None:
-    """Return the fewest gores that are within the allowed distance of a design, both ways.
+def _fewest(design: Mesh, body: Revolution, settings: PieceSettings) -> Gores | None:
+    """Return the fewest gores within the allowed distance, both ways; None if there are too many.
 
     Their patterns fit the width of the sheet, if one is given and they fit its length.
-
-    Parameters
-    ----------
-    design : Mesh
-    body : Revolution
-        The design as a body of revolution.
-    settings : PieceSettings
-        With a largest distance.
-
-    Returns
-    -------
-    Gores or None
-        None if that would be too many.
     """
-    allowed = np.inf if settings.max_deviation is None else settings.max_deviation
+    allowed = settings.allowed
     count, known = estimated(body, allowed), {}
     least = _least(body, settings)
 

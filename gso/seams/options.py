@@ -98,6 +98,11 @@ class PieceSettings:
                 f"min_size is {self.min_size!r}, more than the length of a sheet; lower it"
             )
 
+    @property
+    def allowed(self) -> float:
+        """The largest distance from the design; infinite if it has no bound."""
+        return np.inf if self.max_deviation is None else self.max_deviation
+
     def value(self, pieces: int, seam: float) -> tuple[int, float, float]:
         """Rank pieces, lower is better: budgets first, then seam and number of pieces."""
         many = max(0, pieces - self.max_pieces) if self.max_pieces is not None else 0

@@ -76,14 +76,12 @@ class Divided(NamedTuple):
         if not len(lines):
             return self
         mesh, he, label = self.mesh, self.mesh.half_edges, self.label.copy()
-        n, k = len(mesh.vertices), he.interior
+        k = he.interior
         f, g = he.face[k], he.face[he.twin[k]]
-        fixed = np.isin(
-            edge_keys(he.origin[k], he.dest[k], n), pair_keys(np.sort(self.lines(lines)), n)
-        )
+        fixed = he.on(self.lines(lines))[k]
         same = ~fixed & (label[f] == label[g])
         part = label_components(len(mesh.faces), f[same], g[same])
-        area = np.linalg.norm(geometry.area_vectors(mesh.vertices, mesh.faces), axis=1)
+        area = geometry.doubled_areas(mesh.vertices, mesh.faces)
         small = np.bincount(part, area)[part] < least * area.sum()
         across = ~fixed & (label[f] != label[g])
         f, g = np.r_[f[across], g[across]], np.r_[g[across], f[across]]
@@ -124,9 +122,7 @@ class Regions:
     @cached_property
     def face_area(self) -> Array:
         """Area of each face (m,)."""
-        mesh = self.mesh
-        vectors = geometry.area_vectors(mesh.vertices, mesh.faces)
-        return np.asarray(0.5 * np.linalg.norm(vectors, axis=1))
+        return 0.5 * geometry.doubled_areas(self.mesh.vertices, self.mesh.faces)
 
     @cached_property
     def _stiffness(self) -> csr_matrix:
@@ -242,14 +238,13 @@ def _without_ears(mesh: Mesh, label: Ints, creases: Ints) -> Mesh:
 
     Creases (k, 2) stay.
     """
-    he, n = mesh.half_edges, len(mesh.vertices)
+    he = mesh.half_edges
     inside = he.twin >= 0
     inside[inside] = label[he.face[inside]] == label[he.face[he.twin[inside]]]
     number = np.bincount(he.face[inside], minlength=len(mesh.faces))
     k = np.flatnonzero(inside & (number[he.face] == 1))
     k = k[number[he.face[he.twin[k]]] > 1]
-    own = edge_keys(he.origin[k], he.dest[k], n)
-    return with_flips(mesh, k[~np.isin(own, pair_keys(np.sort(creases), n))])
+    return with_flips(mesh, k[~he.on(creases)[k]])
 
 
 def with_flips(mesh: Mesh, half_edges: Ints) -> Mesh:

@@ -70,7 +70,7 @@ def reshaped(
     plane : Plane, optional
         Plane of symmetry of the seams, for designs :func:`at_scale`.
     """
-    allowed = np.inf if settings.max_deviation is None else settings.max_deviation
+    allowed = settings.allowed
     if at_scale(ground.mesh, settings.max_deviation) and ground.mirror is None:
         trial = _at_scale(ground, settings, plane)
         return _patterns(ground, trial.shape, settings), trial.result

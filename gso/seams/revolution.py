@@ -18,6 +18,7 @@ from scipy.sparse import csr_matrix, diags
 from scipy.sparse.csgraph import depth_first_order
 
 from gso import metrics
+from gso.geometry import doubled_areas
 from gso.geometry.polygon import arc_lengths, densified
 from gso.geometry.vectors import cross, lengths, unit
 from gso.linalg import spd
@@ -143,8 +144,7 @@ class Revolution:
 
 def _axes(mesh: Mesh) -> list[tuple[Array, Array]]:
     """Return axes to try: points and directions, the best first."""
-    corners = mesh.vertices[mesh.faces]
-    area = 0.5 * lengths(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    corners, area = mesh.vertices[mesh.faces], doubled_areas(mesh.vertices, mesh.faces)
     weight, middle, normal = area / area.sum(), centres(mesh), metrics.face_normals(mesh)
     centroid = weight @ middle
     # Second moments of triangles: a twelfth at the corners, three quarters at the centre.
@@ -186,16 +186,19 @@ class _Sections:
         self._sides = mesh.edge_numbers(he.origin, he.dest).reshape(-1, 3)
 
     @cached_property
+    def _places(self) -> Array:
+        """Radius and height (n, 2) of all vertices."""
+        return np.stack([np.hypot(self._x, self._y), self._z], axis=1)
+
+    @cached_property
     def points(self) -> Array:
         """Radius and height (n, 2) of the vertices that are used."""
-        used = self.mesh.used
-        return np.stack([np.hypot(self._x, self._y), self._z], axis=1)[used]
+        return self._places[self.mesh.used]
 
     @cached_property
     def rim(self) -> Array:
         """Radius and height (k, 2) of the vertices on the boundary."""
-        own = self.mesh.half_edges.boundary_vertex
-        return np.stack([np.hypot(self._x, self._y), self._z], axis=1)[own]
+        return self._places[self.mesh.half_edges.boundary_vertex]
 
     def body(self, distance: float) -> Revolution | None:
         """Return the body of revolution about the axis; None if the mesh is too far from it."""

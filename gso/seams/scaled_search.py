@@ -25,7 +25,8 @@ from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.region_merges import Merges
 from gso.seams.symmetry import symmetric_points
-from gso.seams.trial import Allowed, Trial, tried
+from gso.seams.trial import Allowed, Trial
+from gso.seams.trial_solve import tried
 from gso.seams.wanted import Wanted
 from gso.typing import Flags, Ints
 
@@ -91,8 +92,10 @@ def _along_creases(
     They are taken if that costs little.
     """
     best, allowed = trials[-1], search.allowed
+    if not best.holds:
+        return search, trials
     edges, features = feature_edges(allowed.design)
-    if not best.holds or not 0 < features <= max(1, len(best.pieces) // _FEW_FEATURES):
+    if not 0 < features <= max(1, len(best.pieces) // _FEW_FEATURES):
         return search, trials
     search.settings.say(f"seams along the creases around features: {features}")
     wanted = wanted or Wanted.nothing(allowed.design)
@@ -116,9 +119,9 @@ def _of_copy(search: CopySearch) -> list[Trial]:
         others = (len(LEVELS) - number) * max(len(found) // max(number - 1, 1), 1)
         some = _first(search, labels[: effort.variants], others)
         if some and not some[-1].holds:
-            best = min(some, key=lambda one: float(one.excess.max()))
+            best = min(some, key=lambda one: one.worst)
             some += (more := _pursued(search, best))
-            best = min([best, *more], key=lambda one: float(one.excess.max()))
+            best = min([best, *more], key=lambda one: one.worst)
             some += _refined(search, best, others)
         found += some
         if any(one.holds for one in found) or (found and _hopeless(found[-1])):
@@ -154,7 +157,7 @@ def _first(search: CopySearch, labels: list[Ints], others: int) -> list[Trial]:
         said = f"seams, way {number} of {len(labels)}: {pieces} pieces"
         search.remaining.of_copy(said, possible)
         found.append(search.measured(label, most=_NEARLY))
-        far = min(float(one.excess.max()) for one in found) > _FAR
+        far = min(one.worst for one in found) > _FAR
         if found[-1].holds or (far and number >= _ENOUGH):
             break
     return found
@@ -163,10 +166,10 @@ def _first(search: CopySearch, labels: list[Ints], others: int) -> list[Trial]:
 def _pursued(search: CopySearch, trial: Trial) -> list[Trial]:
     """Solve a division again from where it is, as long as it needs less and less."""
     found: list[Trial] = []
-    while len(found) < _PURSUITS and not trial.holds and trial.excess.max() <= _FAR:
+    while len(found) < _PURSUITS and not trial.holds and trial.worst <= _FAR:
         search.remaining.of_copy(f"shape of {len(trial.pieces)} pieces", _PURSUITS - len(found))
         found.append(search.measured(trial.label, trial.width, begin=trial))
-        if found[-1].excess.max() > _LESS * trial.excess.max():
+        if found[-1].worst > _LESS * trial.worst:
             break
         trial = found[-1]
     return found
@@ -180,7 +183,7 @@ def _refined(search: CopySearch, trial: Trial, others: int, most: float = _FEW) 
     found: list[Trial] = []
     effort = search.settings.effort
     while len(found) < effort.divisions:
-        few = _failed(search, trial) <= most or trial.excess.max() <= _LITTLE
+        few = _failed(search, trial) <= most or trial.worst <= _LITTLE
         if trial.holds or _hopeless(trial) or not few:
             break
         label = search.smaller(trial, trial.of_regions())
@@ -207,7 +210,7 @@ def _hopeless(trial: Trial) -> bool:
 def _rank(trial: Trial, settings: PieceSettings) -> tuple[float, ...]:
     value = settings.value(len(trial.pieces), trial.pieces.seam_length)
     missing = Budgets(trial, settings, 1.0).missing
-    return (max(float(trial.excess.max()), 1.0), missing, *value)
+    return (max(trial.worst, 1.0), missing, *value)
 
 
 def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:

@@ -130,13 +130,12 @@ def _inside(ground: Ground, label: Ints, a: int, b: int) -> Ints:
 
 def _divided(ground: Ground, faces: Ints, path: Ints) -> Flags | None:
     """Divide faces along a path: mark those on one side; None unless there are two sides."""
-    mesh, n = ground.mesh, len(ground.mesh.vertices)
-    he = mesh.half_edges
+    mesh, he = ground.mesh, ground.mesh.half_edges
     local = np.full(len(mesh.faces), -1)
     local[faces] = np.arange(len(faces))
     k = he.interior
     f, g = local[he.face[k]], local[he.face[he.twin[k]]]
-    cut = np.isin(edge_keys(he.origin[k], he.dest[k], n), edge_keys(path[:-1], path[1:], n))
+    cut = he.on(np.stack([path[:-1], path[1:]], axis=1))[k]
     keep = (f >= 0) & (g >= 0) & ~cut
     side = label_components(len(faces), f[keep], g[keep])
     return side == 0 if side.max(initial=0) == 1 else None

@@ -46,6 +46,11 @@ class HalfEdges:
         """One half-edge of each interior edge, ascending."""
         return np.flatnonzero(self.twin > np.arange(self.twin.size))
 
+    def on(self, edges: Ints) -> Flags:
+        """Mark the half-edges (h,) that lie on some edges (e, 2), in either direction."""
+        own = edge_keys(self.origin, self.dest, self.vertex_count)
+        return np.isin(own, pair_keys(edges, self.vertex_count))
+
     @cached_property
     def face_count(self) -> Ints:
         """Number of faces at each vertex."""
