@@ -50,7 +50,7 @@ class Effort:
 EFFORTS = {
     "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=3),
     "standard": Effort(divisions=3, merges=8, rounds=9, budgets=12, variants=6),
-    "best": Effort(divisions=4, merges=24, rounds=6, budgets=30, variants=12),
+    "best": Effort(divisions=4, merges=24, rounds=12, budgets=30, variants=12),
 }
 
 
