@@ -10,7 +10,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-
 from scipy.spatial import cKDTree
 
 from gso import faults
