@@ -23,9 +23,11 @@ from gso.seams.crease_lines import crease_lines
 from gso.seams.distance_estimate import largest_curvatures
 from gso.seams.kinds import Creases
 from gso.seams.potential import Potential
-from gso.seams.wanted import Wanted
+from gso.seams.wanted import Wanted, without_specks
 from gso.typing import Ints
 
+#: Area over the whole below which nobody would cut a piece.
+TINY = 0.003
 #: Share of the distance that smoothing may use.
 _SMOOTH = 0.3
 #: Edge of the copy over the distance, and least and most vertices of a copy.
@@ -84,6 +86,7 @@ class CoarseCopy:
         """What is asked of the seams of the copy."""
         wanted, lines = self.wanted, self.lines
         kept, along = (lines[np.isin(self.ids, own)[lines].all(axis=1)] for own in wanted.lines)
+        kept = without_specks(self.mesh, kept, TINY)
         return Wanted(kept, along, wanted.avoided[self.ids])
 
     @classmethod

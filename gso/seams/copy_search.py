@@ -13,7 +13,7 @@ from gso.cut_pieces import Pieces
 from gso.geometry.plane import Plane
 from gso.seams.candidates import disks
 from gso.seams.carrying import base_fields
-from gso.seams.coarse_copy import CoarseCopy
+from gso.seams.coarse_copy import TINY, CoarseCopy
 from gso.seams.compact_patches import patches
 from gso.seams.distance_estimate import DistanceEstimates
 from gso.seams.kinds import edges_between
@@ -47,8 +47,6 @@ _APEX = 60.0
 _CORNER = 4
 #: Area of a region over the mean, below which it goes to a neighbour at first.
 _SMALL = 0.08
-#: Area of a region over the whole below which it always goes to a neighbour.
-TINY = 0.003
 #: Number of patches of regions that are divided.
 _FINER = 200
 #: Share of faces that seams should avoid from which on these regions are divided all the same.

@@ -17,8 +17,8 @@ from gso.geometry.plane import Plane
 from gso.mesh import Mesh
 from gso.seams.budgets import Budgets
 from gso.seams.carrying import base_start
-from gso.seams.coarse_copy import CoarseCopy
-from gso.seams.copy_search import LEVELS, TINY, CopySearch
+from gso.seams.coarse_copy import TINY, CoarseCopy
+from gso.seams.copy_search import LEVELS, CopySearch
 from gso.seams.crease_lines import feature_edges
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
