@@ -34,6 +34,8 @@ _ROOM = 0.95
 LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
 #: Numbers of patches, and how much compact pieces are preferred.
 _PATCHES, _COMPACT = (50, 100, 200, 400), (2.0, 5.0, 10.0)
+#: How often regions far beyond a bound are halved, and the estimate over the bound from which on.
+_HALVINGS, _BEYOND = 3, 2.0
 #: Range of the factor on the bound of a piece that is divided.
 _SMALLER = (0.35, 0.8)
 #: Width of the diffusion that makes boundaries fair: in mean edges of the copy, and in necks where
@@ -175,6 +177,7 @@ class CopySearch:
         for label in self.first_patches:
             for compact in _COMPACT:
                 own = self.regions.fair(self.merged(label, bound, compact), self.width)
+                own = self._in_halves(own, level)
                 found.append(self.alike(self.without_small(own, _SMALL)))
         found.sort(key=self.value)
         return [x for k, x in enumerate(found) if not any((x == y).all() for y in found[:k])]
@@ -317,7 +320,26 @@ class CopySearch:
             regions = Regions(mesh, self.copy.lines)
         new = self.merged(start, level, _COMPACT[0], ground)
         new = self._sides(label, new, trial.folds_only)
-        return self.alike(self.without_small(regions.fair(new, self.width, rounds=1)))
+        fair = regions.fair(new, self.width, rounds=1)
+        # The others stay as they are, since a solve that begins with their shape needs that.
+        new = _inside(label, bad, new, fair)
+        return self.alike(self.without_small(regions.connected(numbered(new))))
+
+    def _in_halves(self, label: Ints, level: float) -> Ints:
+        """Divide regions that are far beyond a bound on the estimate at their silhouette.
+
+        Where a region is thin, such as one side of an ear, diffusion gives it to its neighbour.
+        """
+        for _ in range(_HALVINGS):
+            values = [self.estimate(np.flatnonzero(label == k)) for k in range(label.max() + 1)]
+            bad = np.array([one is None or one > _BEYOND * level for one in values])
+            if not bad.any():
+                break
+            new = self.regions.fair(self._sides(label, label, bad), self.width, rounds=1)
+            if np.array_equal(new, label):
+                break
+            label = new
+        return label
 
     def _sides(self, label: Ints, new: Ints, some: Flags) -> Ints:
         """Divide some regions (k,) at the silhouette of what sticks out, such as a fin or an ear.
@@ -346,3 +368,14 @@ class CopySearch:
         if self.mirror is None or self.base_mirror is None:
             return fields
         return self.base_mirror.symmetric(fields, self.mirror.partners(label))
+
+
+def _inside(label: Ints, some: Flags, new: Ints, fair: Ints) -> Ints:
+    """Return new regions with fair boundaries inside some regions (k,); others keep their faces."""
+    count = int(label.max()) + 1
+    inside = some[label]
+    # The regions that the fair ones are inside.
+    own = np.full((int(fair.max()) + 1, count), 0)
+    np.add.at(own, (fair[inside], label[inside]), 1)
+    same = inside & (own.argmax(axis=1)[fair] == label)
+    return np.where(same, count + fair, np.where(inside, count + int(fair.max()) + 1 + new, label))

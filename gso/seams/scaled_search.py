@@ -35,8 +35,9 @@ from gso.typing import Flags, Ints
 _FEW, _LITTLE = 0.4, 1.5
 #: Excess up to which a first solve of a division is repaired.
 _NEARLY = 1.15
-#: Excess of all of some divisions from which on others with as many pieces are not tried.
-_FAR, _ENOUGH = 2.3, 3
+#: Excess of all of some divisions from which on others with as many pieces are not tried, and the
+#: share of the area in pieces that do not hold from which on one division is enough for that.
+_FAR, _ENOUGH, _ALL = 2.3, 3, 0.95
 #: How often a division is solved again from where it is, and the largest ratio of its excess.
 _PURSUITS, _LESS = 3, 0.97
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
@@ -158,7 +159,8 @@ def _first(search: CopySearch, labels: list[Ints], others: int) -> list[Trial]:
         search.remaining.of_copy(said, possible)
         found.append(search.measured(label, most=_NEARLY))
         far = min(one.worst for one in found) > _FAR
-        if found[-1].holds or (far and number >= _ENOUGH):
+        enough = _ENOUGH if min(_failed(search, one) for one in found) < _ALL else 1
+        if found[-1].holds or (far and number >= enough):
             break
     return found
 

@@ -53,7 +53,7 @@ _NEARER = 2.0
 #: Range of the factor on the weight of fairness where faces are folded, and what each of them adds.
 _FAIRER, _SHARE_OF_FOLDS = (2.5, 8.0), 0.15
 #: Excess up to which little is missing.
-_CLOSE = 1.08
+_CLOSE = 1.1
 #: Ratio of what a result needs to the least before, up to which it becomes much less.
 _PROGRESS = 0.8
 #: Angle in degrees from which on an edge of a folded face is flipped.
@@ -147,7 +147,8 @@ def tried(
         if not _repairable(trial, known) or (start is None and trial.worst > most):
             break
         needs.append(float(max(trial.distance.max(), trial.strain.max())))
-        if number >= repairs and needs[-1] > max(_CLOSE, _PROGRESS * min(needs[:-1], default=0.0)):
+        progress = needs[-1] <= _PROGRESS * min(needs[:-1], default=0.0)
+        if number >= repairs and trial.worst > _CLOSE and not progress:
             break
         own = _stricter(own, trial)
         corrections.measure(trial.shape.design, trial.crossed)
