@@ -238,7 +238,7 @@ class CopySearch:
             divided,
             self.opened(divided, kept, self.apexes),
             self.of_copy,
-            None if begin is None else divided.moved(begin.untangled[: len(regions.mesh.vertices)]),
+            None if begin is None else divided.moved_as(begin.divided, begin.untangled),
             _ITERATIONS,
             repairs=_REPAIRS,
             executor=self.settings.executor,

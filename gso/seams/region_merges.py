@@ -76,7 +76,7 @@ class Merges:
             said = f"{len(best.pieces)} pieces, without {len(pairs)} of them"
             search.remaining.of_copy(said, solves)
             label = self._joined(pairs)
-            trial = search.measured(label, best.width)
+            trial = search.measured(label, best.width, begin=best)
             if trial.holds and Budgets(trial, search.settings).missing <= before:
                 self.found.append(trial)
                 break
@@ -109,7 +109,7 @@ class Merges:
             a, b = np.r_[a, partner[a]], np.r_[b, partner[b]]
         count = int(label.max()) + 1
         joined = label_components(count, a, b)[label]
-        return search.alike(search.fair(numbered(joined), self.best.width))
+        return search.alike(numbered(joined))
 
     def _pairs(self, likely: float, some: Ints | None = None) -> list[_Pair]:
         """Choose pairs of neighbours to merge, those with the least estimate first.

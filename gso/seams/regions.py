@@ -63,6 +63,19 @@ class Divided(NamedTuple):
         """Return points (n + k, 3) for those of the mesh that was divided (n, 3)."""
         return with_points(points, self.ends, self.shares)
 
+    def moved_as(self, before: Divided, points: Array) -> Array:
+        """Return points (n + k, 3) for those (n + b, 3) of another division of the same mesh.
+
+        New vertices at the same places of the same edges keep their points.
+        """
+        count = len(self.mesh.vertices) - len(self.ends)
+        out = self.moved(points[:count])
+        own, other = (pair_keys(one.ends, count) for one in (self, before))
+        _, k, b = np.intersect1d(own, other, return_indices=True)
+        same = np.abs(self.shares[k] - before.shares[b]) < _SNAP
+        out[count + k[same]] = points[count + b[same]]
+        return out
+
     def lines(self, lines: Ints) -> Ints:
         """Return edges for lines (k, 2) of the mesh that was divided."""
         return followed(lines, self.ends, len(self.mesh.vertices) - len(self.ends))

@@ -48,6 +48,8 @@ _FEW_FEATURES = 3
 _FOR_CREASES = 2
 #: Iterations of the solve of the design, from the shape of the copy.
 _ITERATIONS = 16
+#: How often few regions of a trial are divided before an earlier one is tried.
+_REFINED = 3
 #: How often these are solved again where they nearly hold.
 _REPAIRS = 3
 #: Share of a region's area that two regions have in common which are the same.
@@ -225,6 +227,7 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
     found: list[Trial] = []
     trial, others = trials[-1], trials[:-1]
     begin: Trial | None = None
+    refined = 0
     rounds = settings.effort.rounds
     for number in range(rounds):
         # The first attempt is mostly the last.
@@ -237,8 +240,9 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
         excess = own.of_regions(own.too_large)
         while others and _has(others[-1].label, trial.label, excess > 1.0):
             others.pop()
-        if others:
-            trial, begin = others.pop(), None
+        refined += 1
+        if others and refined > (_REFINED if _failed(search, own) <= _FEW else 0):
+            trial, begin, refined = others.pop(), None, 0
             continue
         # Parts that only pass through each other are solved again.
         some = (excess > 1.0).any()
@@ -261,7 +265,7 @@ def _carried(search: CopySearch, trial: Trial, begin: Trial | None) -> Trial:
     if begin is None:
         start = base_start(copy, trial, smooth)
     else:
-        start = divided.moved(begin.untangled[: len(copy.base.vertices)])
+        start = divided.moved_as(begin.divided, begin.untangled)
     if search.plane is not None:
         start = symmetric_points(smooth.design, start, search.plane)
     design = smooth.design.replaced(divided.moved(copy.base.vertices))

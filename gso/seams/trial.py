@@ -20,6 +20,7 @@ from gso.seams.cutting import cut
 from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.inverted_faces import inverted_at_seams
 from gso.seams.kinds import Edges
+from gso.seams.regions import Divided
 from gso.seams.sheets import Sheet
 from gso.seams.splitting import apart
 from gso.tasks.developable import Options
@@ -59,8 +60,10 @@ class Trial:
     ----------
     label : ndarray of int, (m,)
         The region of each face of the mesh that was divided.
+    divided : Divided
+        That mesh, with triangles on seams divided.
     pieces : Pieces
-        The pieces of the regions; triangles on seams are divided.
+        The pieces of the regions.
     region : ndarray of int, (p,)
         The region of each piece.
     result : Result or None
@@ -81,6 +84,7 @@ class Trial:
     """
 
     label: Ints
+    divided: Divided
     pieces: Pieces
     region: Ints
     result: Result | None

@@ -232,6 +232,7 @@ def _measured(
     far, outward = _away(shape, allowed)
     return Trial(
         label,
+        divided,
         pieces,
         region,
         result,
