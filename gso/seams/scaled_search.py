@@ -46,8 +46,9 @@ _HOPELESS, _MANY = 20.0, 150
 _FEW_FEATURES = 3
 #: Number of pieces that these may cost for each feature.
 _FOR_CREASES = 2
-#: Iterations of the solve of the design, from the shape of the copy.
-_ITERATIONS = 16
+#: Iterations of the solve of the design, from the shape of the copy, and the factor on the weight of
+#: fairness, since the design has finer faces.
+_ITERATIONS, _FAIRER = 30, 4.0
 #: How often few regions of a trial are divided before an earlier one is tried.
 _REFINED = 3
 #: How often these are solved again where they nearly hold.
@@ -279,7 +280,7 @@ def _carried(search: CopySearch, trial: Trial, begin: Trial | None) -> Trial:
         repairs=_REPAIRS,
         executor=search.settings.executor,
         width=trial.width,
-        options=trial.options,
+        options=replace(trial.options, w_fairness=_FAIRER * trial.options.w_fairness),
     )
 
 

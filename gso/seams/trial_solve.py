@@ -48,10 +48,11 @@ _COLD, _NEAR_ENOUGH, _MUCH_MORE, _LESS, _UNUSED = 3, 1.15, 8.0, 0.6, 0.3
 _SMOOTHER = 2.5
 #: By how much points inside faces may be farther away than vertices.
 _INSIDE = 1.05
-#: Factor on the weight of distances beyond those that are aimed at, where they are too large.
-_NEARER = 2.0
+#: Factor on the weight of distances beyond those that are aimed at, where they are too large, and
+#: the distance over the allowed one from which on.
+_NEARER, _BARELY = 2.0, 1.02
 #: Range of the factor on the weight of fairness where faces are folded, and what each of them adds.
-_FAIRER, _SHARE_OF_FOLDS = (2.5, 8.0), 0.15
+_FAIRER, _SHARE_OF_FOLDS = (1.3, 8.0), 0.15
 #: Excess up to which little is missing.
 _CLOSE = 1.1
 #: Ratio of what a result needs to the least before, up to which it becomes much less.
@@ -148,9 +149,14 @@ def tried(
             break
         needs.append(float(max(trial.distance.max(), trial.strain.max())))
         progress = needs[-1] <= _PROGRESS * min(needs[:-1], default=0.0)
-        if number >= repairs and trial.worst > _CLOSE and not progress:
+        least = min(one.worst for one in found)
+        if number >= repairs and least > _CLOSE and not progress:
             break
         own = _stricter(own, trial)
+        best = min(found, key=lambda one: one.worst)
+        if best.worst <= _CLOSE:
+            # Another try from where little was missing, with other weights.
+            trial = best
         corrections.measure(trial.shape.design, trial.crossed)
         start, iterations = trial.untangled, _AGAIN
         pieces = _with_flips(trial)
@@ -201,7 +207,8 @@ def _stricter(options: Options, trial: Trial) -> Options:
     if far > 1.0 and options.reach is not None:
         # Where only the design is far from the result, vertices are drawn (`Corrections`).
         far = min(far, max(trial.outward, _INSIDE))
-        reach, weight = options.reach * _BELOW / far, _NEARER * options.w_reach
+        nearer = _NEARER if far > _BARELY else 1.0
+        reach, weight = options.reach * _BELOW / far, nearer * options.w_reach
         options = replace(options, reach=reach, w_reach=weight)
     if trial.folds.any():
         fairer = float(np.clip(_SHARE_OF_FOLDS * trial.folds.sum(), *_FAIRER))
