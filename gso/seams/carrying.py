@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import diags
+from scipy.spatial import cKDTree
 
 from gso.cut_pieces import Pieces
 from gso.linalg import spd
@@ -27,7 +28,8 @@ def base_fields(
     masses = np.zeros((len(base.opened.vertex), int(label.max()) + 1))
     np.add.at(masses, at, coarse.masses(label))
     # Obtuse triangles may make values far from all masses slightly negative.
-    fields = np.maximum(base.diffused(masses, width), 0.0)
+    _, near = cKDTree(coarse.opened.mesh.vertices).query(base.opened.mesh.vertices)
+    fields = np.maximum(base.diffused(masses, coarse.widths(label, width)[near]), 0.0)
     return np.asarray(fields / np.maximum(fields.sum(axis=1, keepdims=True), 1e-300))
 
 

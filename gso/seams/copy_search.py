@@ -35,9 +35,10 @@ LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
 #: Numbers of patches, and how much compact pieces are preferred.
 _PATCHES, _COMPACT = (50, 100, 200, 400), (2.0, 5.0, 10.0)
 #: How often regions far beyond a bound are halved, and the estimate over the bound from which on.
-_HALVINGS, _BEYOND = 3, 2.0
-#: Range of the factor on the bound of a piece that is divided.
-_SMALLER = (0.35, 0.8)
+_HALVINGS, _BEYOND = 3, 3.0
+#: Range of the factor on the bound of a piece that is divided, and the excess up to which it is
+#: divided in two.
+_SMALLER, _LITTLE = (0.35, 0.8), 1.5
 #: Width of the diffusion that makes boundaries fair: in mean edges of the copy, and in necks where
 #: a smallest one is given.
 _WIDTH, _NECK = 1.5, 0.4
@@ -319,6 +320,7 @@ class CopySearch:
             ground = Ground.of(mesh, kept=ground.kept)
             regions = Regions(mesh, self.copy.lines)
         new = self.merged(start, level, _COMPACT[0], ground)
+        new = self._in_two(label, new, bad & (excess <= _LITTLE))
         new = self._sides(label, new, trial.folds_only)
         fair = regions.fair(new, self.width, rounds=1)
         # The others stay as they are, since a solve that begins with their shape needs that.
@@ -340,6 +342,25 @@ class CopySearch:
                 break
             label = new
         return label
+
+    def _in_two(self, label: Ints, new: Ints, some: Flags) -> Ints:
+        """Merge the parts of some regions (k,) that are divided until these are two.
+
+        The pairs with the least estimate come first.
+        """
+        for own in np.flatnonzero(some):
+            inside = label == own
+            while len(parts := np.unique(new[inside])) > 2:
+                pairs = self.neighbours(new)
+                ranked = []
+                for a, b in pairs[np.isin(pairs, parts).all(axis=1)].tolist():
+                    found = self.estimate(np.flatnonzero((new == a) | (new == b)))
+                    ranked.append((np.inf if found is None else found, a, b))
+                if not ranked:
+                    break
+                _, a, b = min(ranked)
+                new = np.where(new == b, a, new)
+        return numbered(new)
 
     def _sides(self, label: Ints, new: Ints, some: Flags) -> Ints:
         """Divide some regions (k,) at the silhouette of what sticks out, such as a fin or an ear.

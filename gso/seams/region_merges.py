@@ -12,7 +12,7 @@ from gso.seams.trial import Trial
 from gso.typing import Ints
 
 #: Share of the pieces that take part in a round of merges, and the largest estimate.
-_SHARE, _LIKELY = 0.25, 1.5
+_SHARE, _LIKELY = 0.2, 1.5
 #: Factor on the width of the diffusion where necks are too narrow, and how often it is applied.
 _WIDER, _OFTEN = 1.35, 4
 

@@ -35,6 +35,8 @@ _AVOIDED = 4.0
 _SNAP = 0.2
 #: Cosine between normals, and smallest angle in radians, of triangles of a flipped edge.
 _ALIKE, _THIN = 0.5, 0.06
+#: Largest width of the diffusion over the area of a region by the length of its boundary.
+_THIN_REGION = 0.6
 #: Rounds in which fragments of regions go to their neighbours.
 _ROUNDS = 8
 
@@ -155,10 +157,25 @@ class Regions:
         )
         return self.potential.stiffness + links
 
-    def diffused(self, masses: Array, width: float) -> Array:
-        """Diffuse masses (p, k) at the vertices of the opened mesh over a width."""
-        solve = spd(diags(self.potential.mass) + width**2 * self._stiffness)
-        return np.stack([solve(column) for column in masses.T], axis=1)
+    def diffused(self, masses: Array, width: float | Array) -> Array:
+        """Diffuse masses (p, k) at the vertices of the opened mesh over a width, or widths (p,)."""
+        size = np.broadcast_to(1.0 / np.square(width), len(masses))
+        solve = spd(diags(self.potential.mass * size) + self._stiffness)
+        return np.stack([solve(column * size) for column in masses.T], axis=1)
+
+    def widths(self, label: Ints, width: float) -> Array:
+        """Return the width (p,) for the vertices of the opened mesh: less where regions are thin."""
+        mesh, he = self.mesh, self.mesh.half_edges
+        k = he.interior
+        a, b = label[he.face[k]], label[he.face[he.twin[k]]]
+        length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
+        count = int(label.max()) + 1
+        around = np.bincount(np.r_[a, b], np.tile(length * (a != b), 2), count)
+        area = np.bincount(label, self.face_area, count)
+        own = np.minimum(width, _THIN_REGION * area / np.maximum(around, 1e-300))[label]
+        out = np.full(len(self.opened.vertex), width)
+        np.minimum.at(out, self.opened.mesh.faces, own[:, None])
+        return out
 
     def masses(self, label: Ints) -> Array:
         """Return the area (p, k) of each region at the vertices of the opened mesh."""
@@ -170,7 +187,7 @@ class Regions:
 
     def fields(self, label: Ints, width: float) -> Array:
         """Return the diffused indicator functions (p, k) of regions, labels of faces (m,)."""
-        return self.diffused(self.masses(label), width)
+        return self.diffused(self.masses(label), self.widths(label, width))
 
     def fair(self, label: Ints, width: float, rounds: int = 2) -> Ints:
         """Make boundaries between regions fair; return the region of each face (m,).

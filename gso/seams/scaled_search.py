@@ -191,7 +191,7 @@ def _refined(search: CopySearch, trial: Trial, others: int, most: float = _FEW) 
         few = _failed(search, trial) <= most or trial.worst <= _LITTLE
         if trial.holds or _hopeless(trial) or not few:
             break
-        label = search.smaller(trial, trial.of_regions())
+        label = search.smaller(trial, trial.of_regions(trial.too_large))
         if np.array_equal(label, trial.label):
             break
         possible = effort.divisions - len(found) - 1 + others + effort.merges

@@ -139,10 +139,11 @@ class Trial:
     @cached_property
     def excess(self) -> Array:
         """What each piece (p,) needs over what is allowed: up to 1 it holds."""
+        out = np.maximum(self.too_large, self.facets if self.facets > 1.0 else 0.0)
         if not self.built:
-            return self.too_large
+            return out
         crossed = self._number(self.crossed)
-        return np.maximum(self.too_large, np.where(crossed > 0, _faulty(crossed), 0.0))
+        return np.maximum(out, np.where(crossed > 0, _faulty(crossed), 0.0))
 
     @cached_property
     def too_large(self) -> Array:
@@ -152,8 +153,7 @@ class Trial:
         )
         folds = np.where(self.folds > 0, _faulty(self.folds), 0.0)
         slivers = np.where(self.slivers > 0, _faulty(self.slivers), 0.0)
-        facets = np.full(len(self.region), self.facets if self.facets > 1.0 else 0.0)
-        return np.asarray(np.max([self.distance, strain, folds, slivers, facets], axis=0))
+        return np.asarray(np.max([self.distance, strain, folds, slivers], axis=0))
 
     @cached_property
     def facets(self) -> float:
