@@ -1,0 +1,86 @@
+"""Better seams of a shape that stays, by measured changes of what an estimate has chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.cut_pieces import Pieces
+from gso.seams.bands import banded, fields
+from gso.seams.candidates import Candidate
+from gso.seams.layout_moves import fair, merged, repaired
+from gso.seams.layouts import Layout, Layouts
+from gso.seams.options import PieceSettings
+from gso.seams.tree import Ground
+
+#: Number of faces that are laid flat at most, relative to those of the design.
+_WORK = 40
+#: Ratio of the estimated to the measured strain of bands at first, and share of the allowed strain
+#: that is aimed at where more was measured.
+_RATIO, _AIM = 1.2, 0.97
+#: How often bands are made narrower where they hold too much strain.
+_ROUNDS = 2
+
+
+def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidate | None:
+    """Return better pieces without darts than those that were found; None if there are none.
+
+    Parameters
+    ----------
+    ground : Ground
+    found : Pieces
+        Cut along edges of the design.
+    settings : PieceSettings
+    """
+    mesh = ground.mesh
+    if ground.mirror is not None:
+        return None
+    layouts = Layouts(ground, settings, _WORK * len(mesh.faces))
+    begun = np.zeros(len(mesh.edges), bool)
+    begun[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
+    first = layouts.of(begun)
+    if len(first.names) < 2:
+        return None
+    settings.say("measured pieces joined")
+    some = [merged(layouts, first)]
+    settings.say("bands")
+    bands = best_bands(layouts)
+    if bands is not None:
+        some.append(merged(layouts, repaired(layouts, bands)))
+    best = min(some, key=lambda one: (layouts.faults(one), layouts.value(one)))
+    settings.say("measured seams moved")
+    best = fair(layouts, repaired(layouts, best))
+    best = repaired(layouts, merged(layouts, best))
+    if (layouts.faults(best), layouts.value(best)) >= (layouts.faults(first), layouts.value(first)):
+        return None
+    return layouts.candidate(best)
+
+
+def best_bands(layouts: Layouts) -> Layout | None:
+    """Divide a triangle mesh into bands in several ways; return the best, measured."""
+    mesh = layouts.ground.mesh
+    if not mesh.is_triangles:
+        return None
+    bound = np.full(len(mesh.faces), _RATIO * layouts.settings.max_strain)
+    found = []
+    for field in fields(layouts):
+        one = banded(layouts, field, bound)
+        if one is not None:
+            found.append((layouts.value(one), len(found), one, field))
+    if not found:
+        return None
+    _, _, best, field = min(found, key=lambda one: one[:2])
+    tried = [best]
+    for _ in range(_ROUNDS):
+        parts = [layouts.part(best, k) for k in range(len(best.names))]
+        excess = np.array([part.excess for part in parts])[best.label]
+        if not (excess > 0.0).any():
+            break
+        # Bands that overlap become narrower, too.
+        less = np.where(excess > 0.0, _AIM * np.exp(-np.minimum(excess, 0.5)), 1.0)
+        bound = bound * less
+        again = banded(layouts, field, bound)
+        if again is None:
+            break
+        best = again
+        tried.append(best)
+    return min(tried, key=lambda one: (layouts.faults(one), layouts.value(one)))
