@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gso.mesh import Paths
+from gso import metrics
+from gso.mesh import Mesh, Paths
 from gso.mesh.topology import label_components
 from gso.seams.chains import chains
 from gso.seams.layouts import Layout, Layouts
 from gso.seams.options import NARROWEST
+from gso.seams.potential import Potential
 from gso.seams.regions import Regions
 from gso.typing import Array, Flags, Ints
 
@@ -25,6 +27,14 @@ _WORTH = 0.004
 _TOGETHER, _ALONE = 4, 5
 #: Rows of faces by which a small piece grows at most.
 _ROWS = 6
+#: Number of faces that are laid flat at most to repair pieces, relative to those of the design.
+_REPAIR = 10
+#: Ratio of the estimated strain to the bound from which on a piece is divided, and how often.
+_FAR, _DIVISIONS = 2.0, 20
+#: Distance of both ends of a cut through a piece, relative to the length of its first part.
+_APART = 2.0
+#: Least distance of both ends where a small piece is joined to another, and both divided again.
+_ASIDE = 0.3
 #: Radius about a neck, relative to its least width, within which faces are added to it.
 _WIDER = (0.6, 1.0, 1.5)
 
@@ -105,7 +115,7 @@ def _regrouped(layouts: Layouts, layout: Layout, wanted: Ints) -> Layout:
             break
         trial = np.where(np.isin(group, left), wanted, label)
         new = layouts.of(layouts.between(trial) | slits)
-        bad = [k for k in layouts.changed(new, layout) if any(layouts.part(new, k).faults)]
+        bad = [k for k in layouts.changed(new, layout) if _worse(layouts, new, k, layout)]
         if not bad:
             if layouts.better(new, layout):
                 layout, label = new, trial
@@ -130,6 +140,14 @@ def _regrouped(layouts: Layouts, layout: Layout, wanted: Ints) -> Layout:
     return layout
 
 
+def _worse(layouts: Layouts, new: Layout, piece: int, old: Layout) -> bool:
+    """Tell whether a piece has more faults than the one that it was before, or too much strain."""
+    before = int(np.bincount(old.label[new.members[piece]]).argmax())
+    most = max(layouts.aim, layouts.strain(old, before))
+    more = layouts.part(new, piece).faults > layouts.part(old, before).faults
+    return more or layouts.strain(new, piece) > most
+
+
 def _groups(layouts: Layouts, label: Ints, wanted: Ints) -> Ints:
     """Number the connected groups of faces (m,) that are to change; -1 for the others."""
     changed = wanted != label
@@ -143,10 +161,15 @@ def _groups(layouts: Layouts, label: Ints, wanted: Ints) -> Ints:
 def repaired(layouts: Layouts, layout: Layout) -> Layout:
     """Change seams at pieces with faults, until nothing helps any more."""
     failed: set[bytes] = set()
-    while layouts.left > 0:
+    end = max(layouts.left - _REPAIR * len(layout.label), 0)
+    while layouts.left > end:
         found = None
-        for k, name in enumerate(layout.names):
-            if name in failed or layouts.part(layout, k).faults == (0.0, 0, 0):
+        faults = [layouts.part(layout, k).faults for k in range(len(layout.names))]
+        for k in sorted(range(len(faults)), key=lambda k: faults[k], reverse=True):
+            name = layout.names[k]
+            if layouts.left <= end or not any(faults[k]):
+                break
+            if name in failed:
                 continue
             found = next(
                 (new for new in _repairs(layouts, layout, k) if layouts.better(new, layout)), None
@@ -160,16 +183,41 @@ def repaired(layouts: Layouts, layout: Layout) -> Layout:
     return layout
 
 
+def divided(layouts: Layouts, layout: Layout) -> Layout:
+    """Divide pieces of far too much estimated strain through the vertices that cause it."""
+    mesh = layouts.ground.mesh
+    for _ in range(_DIVISIONS):
+        lines = []
+        for k in range(len(layout.names)):
+            if layouts.estimate(layout, k) > _FAR * layouts.settings.max_strain:
+                lines.append(through(*layouts.mesh_of(layout, k)))
+        edges = np.concatenate([np.empty((0, 2), np.int64), *lines])
+        if not len(edges):
+            break
+        out = layout.cut.copy()
+        out[mesh.edge_numbers(edges[:, 0], edges[:, 1])] = True
+        layout = layouts.of(out)
+    return layout
+
+
 def _repairs(layouts: Layouts, layout: Layout, piece: int) -> Iterator[Layout]:
     """List changes that may help a piece with faults."""
     part = layouts.part(layout, piece)
     own = layout.label == piece
     slits = layout.cut & ~layouts.between(layout.label)
-    for (a, b), numbers in seams(layouts, layout):
+    for (a, b), numbers in seams(layouts, layout) if part.excess == 0.0 else []:
         if piece in (a, b) and a != b and not layouts.kept[numbers].any():
             out = layout.cut.copy()
             out[numbers] = False
-            yield layouts.of(out)
+            joined = layouts.of(out)
+            yield joined
+            if part.small:
+                both = int(joined.label[layout.members[piece][0]])
+                line = through(*layouts.mesh_of(joined, both), _ASIDE)
+                if len(line):
+                    out = joined.cut.copy()
+                    out[layouts.ground.mesh.edge_numbers(line[:, 0], line[:, 1])] = True
+                    yield layouts.of(out)
 
     def given(faces: Flags, to: Ints | int) -> Layout:
         label = layout.label.copy()
@@ -178,10 +226,17 @@ def _repairs(layouts: Layouts, layout: Layout, piece: int) -> Iterator[Layout]:
 
     if part.small:
         grown = own
-        for _ in range(_ROWS):
-            grown = _wider(layouts, grown)
-            yield given(grown, piece)
+        for other in _neighbours(layouts, layout, piece):
+            grown = own
+            for _ in range(_ROWS):
+                grown = _wider(layouts, grown) & (own | (layout.label == other))
+                yield given(grown, piece)
     if part.excess > 0.0:
+        line = through(*layouts.mesh_of(layout, piece))
+        if len(line):
+            out = layout.cut.copy()
+            out[layouts.ground.mesh.edge_numbers(line[:, 0], line[:, 1])] = True
+            yield layouts.of(out)
         for other in _neighbours(layouts, layout, piece):
             beside = layout.label == other
             row = beside
@@ -190,6 +245,35 @@ def _repairs(layouts: Layouts, layout: Layout, piece: int) -> Iterator[Layout]:
                 yield given(row & own, other)
     if part.narrow and part.sheet is not None:
         yield from _at_neck(layouts, layout, piece, given)
+
+
+def through(mesh: Mesh, vertex: Ints, least: float = 0.0) -> Ints:
+    """Choose edges (e, 2) that divide a disk through the vertex where its scale is largest.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    vertex : ndarray of int, (n,)
+        The numbers of its vertices in the design.
+    least : float
+        Least distance of both ends of the cut, relative to the root of the area.
+    """
+    rim = mesh.half_edges.boundary_vertex
+    if rim.all() or len(mesh.boundary_loops) != 1:
+        return np.empty((0, 2), np.int64)
+    size = np.where(rim, 0.0, np.abs(Potential(mesh).solve(rim)))
+    tip, paths = int(size.argmax()), Paths(mesh)
+    even = np.ones(len(paths.ends))
+    one = paths.cheapest(tip, rim, even)
+    reach = _APART * float(paths.distance(one[:1])[one[-1]])
+    reach = max(reach, least * float(np.sqrt(metrics.area(mesh))))
+    closed = np.zeros(len(rim), bool)
+    closed[one[1:]] = True
+    far = rim & ~np.isfinite(paths.distance(one[-1:], reach)) & ~closed
+    goals = far if far.any() else rim & ~closed
+    two = paths.cheapest(tip, goals, even, closed)
+    line = vertex[np.r_[one[::-1], two[1:]]]
+    return np.stack([line[:-1], line[1:]], axis=1)
 
 
 def _neighbours(layouts: Layouts, layout: Layout, piece: int) -> list[int]:

@@ -26,6 +26,8 @@ from gso.verdict import Code
 
 #: How much larger than the least area and width of a part pieces are to be.
 _CLEAR = 1.2
+#: Share of the allowed strain that is aimed at before seams are straightened.
+_ROOM = 0.94
 #: What a piece without a pattern, and one that overlaps or is inverted, adds to the excess.
 _NONE, _FOLDED = 10.0, 1.0
 
@@ -107,6 +109,8 @@ class Layouts:
 
     def __init__(self, ground: Ground, settings: PieceSettings, most: int):
         self.ground, self.settings, self.left = ground, settings, most
+        #: Strain that is aimed at: straight seams need some room.
+        self.aim = (_ROOM if ground.mesh.is_triangles else 1.0) * settings.max_strain
         mesh, he = ground.mesh, ground.mesh.half_edges
         k = he.interior
         self.number = mesh.edge_numbers(he.origin[k], he.dest[k])
@@ -183,6 +187,11 @@ class Layouts:
             self._known[name] = self._part(mesh, sheet)
         return self._known[name]
 
+    def strain(self, layout: Layout, piece: int) -> float:
+        """Return the largest strain of a piece; infinite without a pattern."""
+        sheet = self.part(layout, piece).sheet
+        return np.inf if sheet is None else sheet.strain
+
     def _part(self, mesh: Mesh, sheet: Sheet | None) -> Part:
         area = metrics.area(mesh)
         small = area < _CLEAR * float(Code.SMALL.info.limit or 0.0) * self.root**2
@@ -232,15 +241,15 @@ class Layouts:
         improves = self.value(new) < self.value(old)
         if not improves and limit == (0.0, 0, 0):
             return False
-        if limit[0] == 0.0:
-            bound = likely * self.settings.max_strain
+        most = max([self.aim, *(self.strain(old, k) for k in gone)])
+        if likely < np.inf:
             unknown = [k for k in changed if new.names[k] not in self._known]
-            if any(self.estimate(new, k) > bound for k in unknown):
+            if any(self.estimate(new, k) > likely * most for k in unknown):
                 return False
         found: list[Part] = []
         for k in sorted(changed, key=lambda k: len(new.members[k])):
             found.append(self.part(new, k))
-            if total(found)[0] > limit[0]:
+            if total(found)[0] > limit[0] or self.strain(new, k) > most:
                 return False
         now = total(found)
         return now < limit or (now == limit and improves)

@@ -7,8 +7,8 @@ import numpy as np
 from gso.cut_pieces import Pieces
 from gso.seams.bands import banded, fields
 from gso.seams.candidates import Candidate
-from gso.seams.layout_moves import fair, merged, repaired
-from gso.seams.layouts import Layout, Layouts
+from gso.seams.layout_moves import divided, fair, merged, repaired
+from gso.seams.layouts import Faults, Layout, Layouts
 from gso.seams.options import PieceSettings
 from gso.seams.tree import Ground
 
@@ -41,18 +41,27 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
     if len(first.names) < 2:
         return None
     settings.say("measured pieces joined")
-    some = [merged(layouts, first)]
+    # Bands are for smooth designs, where the estimate is right.
+    sharp = layouts.faults(first)[0] > 0.0
+    begun = divided(layouts, first) if sharp else first
+    some = [merged(layouts, repaired(layouts, begun))]
     settings.say("bands")
-    bands = best_bands(layouts)
+    bands = None if sharp else best_bands(layouts)
     if bands is not None:
         some.append(merged(layouts, repaired(layouts, bands)))
-    best = min(some, key=lambda one: (layouts.faults(one), layouts.value(one)))
+    best = min(some, key=lambda one: _rank(layouts, one))
     settings.say("measured seams moved")
-    best = fair(layouts, repaired(layouts, best))
-    best = repaired(layouts, merged(layouts, best))
-    if (layouts.faults(best), layouts.value(best)) >= (layouts.faults(first), layouts.value(first)):
+    best = merged(layouts, fair(layouts, best))
+    best = repaired(layouts, best)
+    if _rank(layouts, best) >= _rank(layouts, first):
         return None
     return layouts.candidate(best)
+
+
+def _rank(layouts: Layouts, layout: Layout) -> tuple[Faults, float, float, float, int]:
+    """Rank by faults, budgets, seam and number of pieces."""
+    many, long, _ = layouts.value(layout)
+    return layouts.faults(layout), many, long, layout.length, len(layout.names)
 
 
 def best_bands(layouts: Layouts) -> Layout | None:
@@ -65,7 +74,7 @@ def best_bands(layouts: Layouts) -> Layout | None:
     for field in fields(layouts):
         one = banded(layouts, field, bound)
         if one is not None:
-            found.append((layouts.value(one), len(found), one, field))
+            found.append((one.length, len(found), one, field))
     if not found:
         return None
     _, _, best, field = min(found, key=lambda one: one[:2])
@@ -83,4 +92,4 @@ def best_bands(layouts: Layouts) -> Layout | None:
             break
         best = again
         tried.append(best)
-    return min(tried, key=lambda one: (layouts.faults(one), layouts.value(one)))
+    return min(tried, key=lambda one: _rank(layouts, one))
