@@ -147,9 +147,7 @@ def _joined(layouts: Layouts, thin: Ints, value: Array, begun: Flags) -> Flags:
     return begun
 
 
-def _swept(
-    layouts: Layouts, thin: Ints, value: Array, begun: Flags, bound: Array
-) -> Layout | None:
+def _swept(layouts: Layouts, thin: Ints, value: Array, begun: Flags, bound: Array) -> Layout | None:
     """Join parts, from the lowest to the highest, as long as the estimate holds."""
     count = int(thin.max()) + 1
     number = np.bincount(thin, minlength=count)

@@ -22,7 +22,7 @@ from gso.seams.tree import Ground
 #: strain that is aimed at.
 _RATIO, _AIM = 1.17, 0.985
 #: Number of attempts, and of merged pieces that are measured in each.
-_ATTEMPTS, _MEASURED = 4, 2
+_ATTEMPTS, _MEASURED = 4, 3
 
 
 def dartless(ground: Ground, settings: PieceSettings) -> Candidate:

@@ -26,6 +26,8 @@ from gso.verdict import Code
 
 #: How much larger than the least area and width of a part pieces are to be.
 _CLEAR = 1.2
+#: Number of faces that a small piece counts as when it is laid flat.
+_LEAST = 150
 #: Share of the allowed strain that is aimed at before seams are straightened.
 _ROOM = 0.94
 #: What a piece without a pattern, and one that overlaps or is inverted, adds to the excess.
@@ -151,13 +153,14 @@ class Layouts:
 
     def pruned(self, cut_edges: Flags) -> Flags:
         """Leave out seams (e,) that end inside the surface; those that stay are left."""
-        mesh, out = self.ground.mesh, cut_edges.copy()
+        mesh, out = self.ground.mesh, np.array(cut_edges)
         rim = mesh.half_edges.boundary_vertex
         while True:
             some = np.flatnonzero(out)
             ends = mesh.edges[some]
             number = np.bincount(ends.ravel(), minlength=len(mesh.vertices))
-            loose = ((number[ends] == 1) & ~rim[ends]).any(axis=1) & ~self.kept[some]
+            free = (number[ends] == 1) & ~rim[ends]
+            loose = np.asarray(free.any(axis=1)) & ~self.kept[some]
             if not loose.any():
                 return out
             out[some[loose]] = False
@@ -182,7 +185,7 @@ class Layouts:
             disk = len(mesh.boundary_loops) == 1 and mesh.euler_characteristic == 1
             sheet = None
             if disk:
-                self.left -= len(mesh.faces)
+                self.left -= max(len(mesh.faces), _LEAST)
                 sheet = flattened(mesh)
             self._known[name] = self._part(mesh, sheet)
         return self._known[name]

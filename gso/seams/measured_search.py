@@ -7,16 +7,20 @@ import numpy as np
 from gso.cut_pieces import Pieces
 from gso.seams.bands import banded, fields
 from gso.seams.candidates import Candidate
-from gso.seams.layout_moves import divided, fair, merged, repaired
+from gso.seams.layout_moves import fair, merged
+from gso.seams.layout_repairs import divided, repaired
 from gso.seams.layouts import Faults, Layout, Layouts
 from gso.seams.options import PieceSettings
 from gso.seams.tree import Ground
+from gso.typing import Array
 
 #: Number of faces that are laid flat at most, relative to those of the design.
 _WORK = 40
 #: Ratio of the estimated to the measured strain of bands at first, and share of the allowed strain
 #: that is aimed at where more was measured.
 _RATIO, _AIM = 1.2, 0.97
+#: Ratio of the length of seams up to which pieces may be better for their number of faults.
+_LONGER = 1.1
 #: How often bands are made narrower where they hold too much strain.
 _ROUNDS = 2
 
@@ -35,20 +39,23 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
     if ground.mirror is not None:
         return None
     layouts = Layouts(ground, settings, _WORK * len(mesh.faces))
-    begun = np.zeros(len(mesh.edges), bool)
-    begun[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
-    first = layouts.of(begun)
+    cut_edges = np.zeros(len(mesh.edges), bool)
+    cut_edges[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
+    first = layouts.of(cut_edges)
     if len(first.names) < 2:
         return None
     settings.say("measured pieces joined")
     # Bands are for smooth designs, where the estimate is right.
     sharp = layouts.faults(first)[0] > 0.0
-    begun = divided(layouts, first) if sharp else first
-    some = [merged(layouts, repaired(layouts, begun))]
+    start = repaired(layouts, divided(layouts, first)) if sharp else first
+    some = [merged(layouts, start)]
     settings.say("bands")
     bands = None if sharp else best_bands(layouts)
     if bands is not None:
         some.append(merged(layouts, repaired(layouts, bands)))
+    # Longer seams are no price for a small or narrow piece fewer.
+    short = min(one.length for one in some if layouts.faults(one)[0] <= layouts.faults(some[0])[0])
+    some = [one for one in some if one.length <= _LONGER * short]
     best = min(some, key=lambda one: _rank(layouts, one))
     settings.say("measured seams moved")
     best = merged(layouts, fair(layouts, best))
@@ -70,7 +77,7 @@ def best_bands(layouts: Layouts) -> Layout | None:
     if not mesh.is_triangles:
         return None
     bound = np.full(len(mesh.faces), _RATIO * layouts.settings.max_strain)
-    found = []
+    found: list[tuple[float, int, Layout, Array]] = []
     for field in fields(layouts):
         one = banded(layouts, field, bound)
         if one is not None:

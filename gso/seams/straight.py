@@ -7,8 +7,8 @@ import numpy as np
 from gso import metrics
 from gso.cut_pieces import Pieces
 from gso.errors import MeshError
-from gso.seams.candidates import Candidate
 from gso.mesh.topology import pair_keys
+from gso.seams.candidates import Candidate
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
 from gso.seams.options import NARROWEST, PieceSettings
@@ -80,9 +80,7 @@ def _earlier(pieces: Pieces, before: Pieces) -> Ints:
     return np.asarray(table.argmax(axis=1))
 
 
-def straightened_pieces(
-    ground: Ground, pieces: Pieces, stay: Ints | None = None
-) -> Pieces | None:
+def straightened_pieces(ground: Ground, pieces: Pieces, stay: Ints | None = None) -> Pieces | None:
     """Return pieces with straight seams; None where nothing can be straightened.
 
     Seams with an edge of `stay` (k, 2) are left.
