@@ -23,6 +23,8 @@ from gso.seams.tree import Ground
 _RATIO, _AIM = 1.17, 0.985
 #: Number of attempts, and of merged pieces that are measured in each.
 _ATTEMPTS, _MEASURED = 4, 3
+#: Number of results that hold the strain after which the best of them is taken.
+_ENOUGH = 3
 
 
 def dartless(ground: Ground, settings: PieceSettings) -> Candidate:
@@ -53,11 +55,11 @@ def _merged(ground: Ground, settings: PieceSettings) -> Candidate:
             found.append(one)
             strains.append(one.strain)
         good = [one for one in found if one.strain <= settings.max_strain and one.sound]
-        if good:
+        if len(good) >= _ENOUGH or (good and attempt):
             break
         middle = float(np.median(strains))
         ratio *= float(np.clip(_AIM * settings.max_strain / max(middle, 1e-300), 0.5, 1.0))
-        ratio *= 0.98
+        ratio *= 1.0 if len(good) else 0.98
     if good:
         return min(good, key=lambda one: ranked(one, settings))
     return min(found, key=lambda one: (not one.sound, one.strain))

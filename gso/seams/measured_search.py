@@ -42,7 +42,8 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
     cut_edges = np.zeros(len(mesh.edges), bool)
     cut_edges[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
     first = layouts.of(cut_edges)
-    if len(first.names) < 2:
+    # Quads become strips along rulings, for which compact pieces are better than longer ones.
+    if len(first.names) < 2 or not (mesh.is_triangles or any(layouts.faults(first))):
         return None
     settings.say("measured pieces joined")
     # Bands are for smooth designs, where the estimate is right.
