@@ -14,6 +14,9 @@ from gso.typing import Flags, Ints
 
 #: Ratio of estimated strain and bound up to which a changed piece is laid flat.
 _LIKELY = 1.5
+#: Least length of the seam along which two pieces are joined, relative to the root of the area of
+#: the smaller one: along shorter ones pieces become long and winding.
+_WIDE = 0.5
 #: Widths over which seams are made fair, in mean edge lengths.
 _WIDTHS = (6.0, 3.0, 1.5)
 #: Length of a seam, relative to the root of the area, that is worth laying pieces flat again.
@@ -45,9 +48,11 @@ def merged(layouts: Layouts, layout: Layout) -> Layout:
 def _joins(layouts: Layouts, layout: Layout) -> Iterator[tuple[tuple[bytes, bytes, bytes], Flags]]:
     """List cuts without one seam between two pieces, the longest seam first."""
     lines = []
+    root = np.sqrt(np.bincount(layout.label, layouts.face_area)) / layouts.root
     for (a, b), numbers in seams(layouts, layout):
-        if a != b and not layouts.kept[numbers].any():
-            lines.append((-float(layouts.cost[numbers].sum()), a, b, numbers))
+        length = float(layouts.cost[numbers].sum())
+        if a != b and not layouts.kept[numbers].any() and length > _WIDE * min(root[a], root[b]):
+            lines.append((-length, a, b, numbers))
     for _, a, b, numbers in sorted(lines, key=lambda one: one[:3]):
         out = layout.cut.copy()
         out[numbers] = False

@@ -15,7 +15,7 @@ from gso.seams.tree import Ground
 from gso.typing import Array
 
 #: Number of faces that are laid flat at most, relative to those of the design.
-_WORK = 40
+_WORK = 25
 #: Ratio of the estimated to the measured strain of bands at first, and share of the allowed strain
 #: that is aimed at where more was measured.
 _RATIO, _AIM = 1.2, 0.97
