@@ -14,8 +14,9 @@ from gso.seams.options import PieceSettings
 from gso.seams.tree import Ground
 from gso.typing import Array
 
-#: Number of faces that are laid flat at most, relative to those of the design.
-_WORK = 25
+#: Number of faces that are laid flat at most, relative to those of the design, and the least number
+#: that counts as these.
+_WORK, _FEW = 25, 2500
 #: Ratio of the estimated to the measured strain of bands at first, and share of the allowed strain
 #: that is aimed at where more was measured.
 _RATIO, _AIM = 1.2, 0.97
@@ -38,7 +39,7 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
     mesh = ground.mesh
     if ground.mirror is not None:
         return None
-    layouts = Layouts(ground, settings, _WORK * len(mesh.faces))
+    layouts = Layouts(ground, settings, _WORK * max(len(mesh.faces), _FEW))
     cut_edges = np.zeros(len(mesh.edges), bool)
     cut_edges[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
     first = layouts.of(cut_edges)
