@@ -17,6 +17,8 @@ from gso.typing import Array
 #: Number of faces that are laid flat at most, relative to those of the design, and the least number
 #: that counts as these.
 _WORK, _FEW = 25, 2500
+#: The same for the repairs at the end.
+_LAST = 8
 #: Ratio of the estimated to the measured strain of bands at first, and share of the allowed strain
 #: that is aimed at where more was measured.
 _RATIO, _AIM = 1.2, 0.97
@@ -61,6 +63,7 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
     best = min(some, key=lambda one: _rank(layouts, one))
     settings.say("measured seams moved")
     best = merged(layouts, fair(layouts, best))
+    layouts.left = max(layouts.left, _LAST * len(mesh.faces))
     best = repaired(layouts, best)
     if _rank(layouts, best) >= _rank(layouts, first):
         return None
