@@ -13,6 +13,7 @@ from gso.seams.candidates import (
     ranked,
     without_darts,
 )
+from gso.seams.measured_search import improved
 from gso.seams.options import PieceSettings
 from gso.seams.straight import straight
 from gso.seams.tree import Ground
@@ -27,10 +28,20 @@ _ENOUGH = 3
 
 
 def dartless(ground: Ground, settings: PieceSettings) -> Candidate:
-    """Merge patches in several ways, and take the best result that holds the strain.
+    """Merge patches in several ways, and improve the best result by what is measured.
 
     The bound of the estimate is adapted to what was measured.
     """
+    best = _merged(ground, settings)
+    better = improved(ground, best.pieces, settings)
+    if better is not None:
+        best = better
+    holds = best.strain <= settings.max_strain and best.sound
+    return straight(ground, best, settings) if holds else best
+
+
+def _merged(ground: Ground, settings: PieceSettings) -> Candidate:
+    """Merge patches in several ways; return the best result that holds the strain."""
     found: list[Candidate] = []
     ratio = _RATIO
     for attempt in range(_ATTEMPTS):
@@ -39,23 +50,16 @@ def dartless(ground: Ground, settings: PieceSettings) -> Candidate:
         strains = []
         for some in sorted(pool, key=lambda one: merged_value(one, settings))[:_MEASURED]:
             one = measured(ground, pieces_of(some), settings.max_size, settings.say)
-            if one.strain <= settings.max_strain and one.sound:
-                one = _finished(ground, one, settings)
+            if settings.min_size is not None and one.strain <= settings.max_strain and one.sound:
+                one = joined(ground, one, settings.max_strain, np.inf, settings, whole=True)
             found.append(one)
             strains.append(one.strain)
         good = [one for one in found if one.strain <= settings.max_strain and one.sound]
         if len(good) >= _ENOUGH or (good and attempt):
-            return min(good, key=lambda one: ranked(one, settings))
+            break
         middle = float(np.median(strains))
         ratio *= float(np.clip(_AIM * settings.max_strain / max(middle, 1e-300), 0.5, 1.0))
         ratio *= 1.0 if len(good) else 0.98
     if good:
         return min(good, key=lambda one: ranked(one, settings))
     return min(found, key=lambda one: (not one.sound, one.strain))
-
-
-def _finished(ground: Ground, found: Candidate, settings: PieceSettings) -> Candidate:
-    """Join pieces that are too short to a neighbour, and straighten seams."""
-    if settings.min_size is not None:
-        found = joined(ground, found, settings.max_strain, np.inf, settings, whole=True)
-    return straight(ground, found, settings)

@@ -18,6 +18,8 @@ from gso.verdict import Code
 STAYS, CHANGES = 0.01, 0.001
 #: Smallest neck, relative to the root of the area, unless given.
 NECK = 0.1
+#: Smallest neck of a piece of a shape that stays, relative to the root of the piece's area.
+NARROWEST = 0.08
 
 
 @dataclass(frozen=True)

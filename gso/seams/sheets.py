@@ -86,6 +86,10 @@ class Sheet:
         It is the distance along edges between two vertices of the outline with at least 2 % of the
         area on both sides.
         """
+        return self.narrowest(limit)[0]
+
+    def narrowest(self, limit: float) -> tuple[float, tuple[int, int] | None]:
+        """Return the same with the two vertices; None for them where the limit is less."""
         loop = self.outline
         away = Paths(self.mesh).between(loop, limit)[:, loop]
         i, j = np.nonzero(np.isfinite(away))
@@ -95,8 +99,12 @@ class Sheet:
         swept = np.r_[0.0, np.cumsum(p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1])]
         part = swept[j] - swept[i] + p[j, 0] * p[i, 1] - p[i, 0] * p[j, 1]
         share = part / swept[-1]
-        real = np.minimum(share, 1.0 - share) >= _SHARE
-        return min(float(away[i, j][real].min(initial=np.inf)), limit)
+        real = np.flatnonzero(np.minimum(share, 1.0 - share) >= _SHARE)
+        if not real.size:
+            return limit, None
+        k = int(real[away[i, j][real].argmin()])
+        width = float(away[i[k], j[k]])
+        return (width, (int(loop[i[k]]), int(loop[j[k]]))) if width < limit else (limit, None)
 
 
 def laid(mesh: Mesh, formulation: str = "strain") -> Sheet | None:
