@@ -14,10 +14,9 @@ from gso.seams.options import PieceSettings
 from gso.seams.tree import Ground
 from gso.typing import Array
 
-#: Number of faces that are laid flat at most, relative to those of the design, and the least number
-#: that counts as these.
-_WORK, _FEW = 25, 2500
-#: The same for the repairs at the end.
+#: Least number of faces that a design counts as having.
+_FEW = 2500
+#: How often each face may be laid flat for the repairs at the end.
 _LAST = 8
 #: Ratio of the estimated to the measured strain of bands at first, and share of the allowed strain
 #: that is aimed at where more was measured.
@@ -38,10 +37,10 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
         Cut along edges of the design.
     settings : PieceSettings
     """
-    mesh = ground.mesh
-    if ground.mirror is not None:
+    mesh, often = ground.mesh, settings.effort.laid
+    if ground.mirror is not None or not often:
         return None
-    layouts = Layouts(ground, settings, _WORK * max(len(mesh.faces), _FEW))
+    layouts = Layouts(ground, settings, often * max(len(mesh.faces), _FEW))
     cut_edges = np.zeros(len(mesh.edges), bool)
     cut_edges[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
     first = layouts.of(cut_edges)

@@ -39,6 +39,8 @@ class Effort:
     variants : int
         How many divisions are tried for each bound on the estimate, the best by number of pieces
         and seam first.
+    laid : int
+        How often each face is laid flat to find shorter seams of a shape that stays.
     """
 
     divisions: int
@@ -46,13 +48,14 @@ class Effort:
     rounds: int
     budgets: int
     variants: int
+    laid: int
 
 
 #: By name, the fastest first.
 EFFORTS = {
-    "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=3),
-    "standard": Effort(divisions=3, merges=8, rounds=9, budgets=12, variants=6),
-    "best": Effort(divisions=4, merges=24, rounds=12, budgets=30, variants=12),
+    "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=3, laid=0),
+    "standard": Effort(divisions=3, merges=8, rounds=9, budgets=12, variants=6, laid=18),
+    "best": Effort(divisions=4, merges=24, rounds=12, budgets=30, variants=12, laid=50),
 }
 
 
