@@ -164,7 +164,7 @@ class Regions:
         return np.stack([solve(column * size) for column in masses.T], axis=1)
 
     def widths(self, label: Ints, width: float) -> Array:
-        """Return the width (p,) for the vertices of the opened mesh: less where regions are thin."""
+        """Return the width (p,) at vertices of the opened mesh: less where regions are thin."""
         mesh, he = self.mesh, self.mesh.half_edges
         k = he.interior
         a, b = label[he.face[k]], label[he.face[he.twin[k]]]

@@ -46,8 +46,8 @@ _HOPELESS, _MANY = 20.0, 150
 _FEW_FEATURES = 3
 #: Number of pieces that these may cost for each feature.
 _FOR_CREASES = 2
-#: Iterations of the solve of the design, from the shape of the copy, and the factor on the weight of
-#: fairness, since the design has finer faces.
+#: Iterations of the solve of the design, from the shape of the copy, and the factor on the weight
+#: of fairness, since the design has finer faces.
 _ITERATIONS, _FAIRER = 30, 4.0
 #: How often few regions of a trial are divided before an earlier one is tried.
 _REFINED = 3
