@@ -36,6 +36,8 @@ LEVELS = (0.6, 0.4, 0.27, 0.18, 0.12, 0.08)
 _PATCHES, _COMPACT = (50, 100, 200, 400), (2.0, 5.0, 10.0)
 #: How often regions far beyond a bound are halved, and the estimate over the bound from which on.
 _HALVINGS, _BEYOND = 3, 3.0
+#: Number of regions up to which they are tried before they are halved, too.
+_FEW = 2
 #: Range of the factor on the bound of a piece that is divided, and the excess up to which it is
 #: divided in two.
 _SMALLER, _LITTLE = (0.35, 0.8), 1.5
@@ -178,8 +180,9 @@ class CopySearch:
         for label in self.first_patches:
             for compact in _COMPACT:
                 own = self.regions.fair(self.merged(label, bound, compact), self.width)
-                own = self._in_halves(own, level)
-                found.append(self.alike(self.without_small(own, _SMALL)))
+                halved = self._in_halves(own, level)
+                some = [halved] if int(own.max()) >= _FEW else [own, halved]
+                found += [self.alike(self.without_small(one, _SMALL)) for one in some]
         found.sort(key=self.value)
         return [x for k, x in enumerate(found) if not any((x == y).all() for y in found[:k])]
 
