@@ -93,14 +93,6 @@ class CopySearch:
         return replace(self.allowed, design=self.copy.mesh, distance=distance, built=False)
 
     @cached_property
-    def beside(self) -> tuple[Ints, Array]:
-        """Faces (e, 2) on both sides of each inner edge of the copy, and its length (e,)."""
-        mesh, he = self.copy.mesh, self.copy.mesh.half_edges
-        k = he.interior
-        length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
-        return np.stack([he.face[k], he.face[he.twin[k]]], axis=1), length
-
-    @cached_property
     def joinable(self) -> Flags:
         """Whether each inner edge (e,) of the copy may vanish, and is not cut in any case."""
         he = self.copy.mesh.half_edges
@@ -108,7 +100,7 @@ class CopySearch:
 
     def neighbours(self, label: Ints) -> Ints:
         """Return the pairs (p, 2) of regions with a common boundary, none of it to be cut."""
-        sides = np.sort(label[self.beside[0]], axis=1)
+        sides = np.sort(label[self.regions.beside[0]], axis=1)
         apart = sides[:, 0] != sides[:, 1]
         fixed = np.unique(sides[apart & ~self.joinable], axis=0).tolist()
         pairs = np.unique(sides[apart], axis=0).tolist()
@@ -192,7 +184,7 @@ class CopySearch:
 
     def value(self, label: Ints) -> tuple[int, float, float]:
         """Rank regions by their number and the length of their boundaries."""
-        faces, length = self.beside
+        faces, length = self.regions.beside
         seam = float(length[np.ptp(label[faces], axis=1) > 0].sum())
         size = float(np.sqrt(self.regions.face_area.sum()))
         return self.settings.value(int(label.max()) + 1, seam / size)
@@ -202,7 +194,7 @@ class CopySearch:
 
         They are smaller than a share of the mean, or so small that nobody would cut them.
         """
-        faces, length = self.beside
+        faces, length = self.regions.beside
         while True:
             size = np.bincount(label, self.regions.face_area)
             small = np.flatnonzero(size < max(share * size.mean(), TINY * size.sum()))
@@ -340,7 +332,7 @@ class CopySearch:
             bad = np.array([one is None or one > _BEYOND * level for one in values])
             if not bad.any():
                 break
-            new = self.regions.fair(self._sides(label, label, bad), self.width, rounds=1)
+            new = self.fair(self._sides(label, label, bad), self.width)
             if np.array_equal(new, label):
                 break
             label = new

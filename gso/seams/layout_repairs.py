@@ -59,7 +59,6 @@ def repaired(layouts: Layouts, layout: Layout) -> Layout:
 
 def divided(layouts: Layouts, layout: Layout) -> Layout:
     """Divide pieces of far too much estimated strain through the vertices that cause it."""
-    mesh = layouts.ground.mesh
     for _ in range(_DIVISIONS):
         lines: list[Ints] = []
         for k in range(len(layout.names)):
@@ -68,9 +67,7 @@ def divided(layouts: Layouts, layout: Layout) -> Layout:
         edges = np.concatenate([np.empty((0, 2), np.int64), *lines])
         if not len(edges):
             break
-        out = layout.cut.copy()
-        out[mesh.edge_numbers(edges[:, 0], edges[:, 1])] = True
-        layout = layouts.of(out)
+        layout = layouts.of(layout.cut | layouts.marked(edges))
     return layout
 
 
@@ -89,9 +86,7 @@ def _repairs(layouts: Layouts, layout: Layout, piece: int) -> Iterator[Layout]:
                 both = int(joined.label[layout.members[piece][0]])
                 line = through(*layouts.mesh_of(joined, both), _ASIDE)
                 if len(line):
-                    out = joined.cut.copy()
-                    out[layouts.ground.mesh.edge_numbers(line[:, 0], line[:, 1])] = True
-                    yield layouts.of(out)
+                    yield layouts.of(joined.cut | layouts.marked(line))
 
     def given(faces: Flags, to: int) -> Layout:
         label = layout.label.copy()
@@ -108,9 +103,7 @@ def _repairs(layouts: Layouts, layout: Layout, piece: int) -> Iterator[Layout]:
     if part.excess > 0.0:
         line = through(*layouts.mesh_of(layout, piece))
         if len(line):
-            out = layout.cut.copy()
-            out[layouts.ground.mesh.edge_numbers(line[:, 0], line[:, 1])] = True
-            yield layouts.of(out)
+            yield layouts.of(layout.cut | layouts.marked(line))
         for other in _neighbours(layouts, layout, piece):
             beside = layout.label == other
             row = beside
@@ -185,9 +178,8 @@ def _at_neck(layouts: Layouts, layout: Layout, piece: int, given: _Given) -> Ite
     centre = np.where(corners < 0, np.inf, away[corners]).min(axis=1)
     for share in _WIDER:
         yield given(centre <= share * least, piece)
-    slit = layout.cut.copy()
-    slit[layouts.ground.mesh.edge_numbers(own[:-1], own[1:])] = True
-    divided = layouts.of(slit)
+    slit = layouts.marked(np.stack([own[:-1], own[1:]], axis=1))
+    divided = layouts.of(layout.cut | slit)
     faces = layout.members[piece]
     parts = np.unique(divided.label[faces])
     if len(parts) != 2:

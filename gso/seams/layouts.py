@@ -10,10 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
-from gso import metrics
+from gso import geometry, metrics
 from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
-from gso.mesh.topology import label_components, pair_keys
+from gso.mesh.topology import label_components
 from gso.seams.candidates import Candidate, fits
 from gso.seams.cutting import cut
 from gso.seams.kinds import Edges
@@ -124,10 +124,7 @@ class Layouts:
         self.root = float(np.sqrt(metrics.area(mesh)))
         cost = mesh.edge_lengths if ground.factor is None else mesh.edge_lengths * ground.factor
         self.cost = np.where(self.inner, cost, 0.0) / self.root
-        self.kept = np.isin(
-            pair_keys(mesh.edges, len(mesh.vertices)),
-            pair_keys(ground.kept.reshape(-1, 2), len(mesh.vertices)),
-        )
+        self.kept = self.marked(ground.kept.reshape(-1, 2))
         self._known: dict[bytes, Part] = {}
 
     def of(self, cut_edges: Flags) -> Layout:
@@ -144,6 +141,13 @@ class Layouts:
         corner = np.full(mesh.faces.shape, -1)
         corner[mesh.faces >= 0] = label_components(len(he.twin), same, after[same])
         return Layout(apart, label, corner, float(self.cost[apart].sum()))
+
+    def marked(self, edges: Ints) -> Flags:
+        """Mark edges (k, 2), given by their vertices, among all (e,)."""
+        mesh = self.ground.mesh
+        out = np.zeros(len(mesh.edges), bool)
+        out[mesh.edge_numbers(edges[:, 0], edges[:, 1])] = True
+        return out
 
     def between(self, label: Ints) -> Flags:
         """Mark the edges (e,) between pieces (m,)."""
@@ -290,7 +294,8 @@ def total(parts: list[Part]) -> Faults:
 def _face_area(mesh: Mesh) -> Array:
     """Return the area of each face (m,), of quads by their diagonals."""
     corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    a, b, c, d = mesh.vertices[corners[:, [0, 1, 2, -1]]].transpose(1, 0, 2)
     if corners.shape[1] == 3:
-        return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
-    return np.asarray(0.5 * np.linalg.norm(np.cross(c - a, d - b), axis=1))
+        return 0.5 * geometry.doubled_areas(mesh.vertices, corners)
+    return np.asarray(
+        0.5 * np.linalg.norm(geometry.quad_area_vectors(mesh.vertices, corners), axis=1)
+    )

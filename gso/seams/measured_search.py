@@ -41,9 +41,7 @@ def improved(ground: Ground, found: Pieces, settings: PieceSettings) -> Candidat
     if ground.mirror is not None or not often:
         return None
     layouts = Layouts(ground, settings, often * max(len(mesh.faces), _FEW))
-    cut_edges = np.zeros(len(mesh.edges), bool)
-    cut_edges[mesh.edge_numbers(found.edges[:, 0], found.edges[:, 1])] = True
-    first = layouts.of(cut_edges)
+    first = layouts.of(layouts.marked(found.edges))
     # Quads become strips along rulings, for which compact pieces are better than longer ones.
     if len(first.names) < 2 or not (mesh.is_triangles or any(layouts.faults(first))):
         return None

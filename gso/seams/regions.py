@@ -140,6 +140,14 @@ class Regions:
         return 0.5 * geometry.doubled_areas(self.mesh.vertices, self.mesh.faces)
 
     @cached_property
+    def beside(self) -> tuple[Ints, Array]:
+        """Faces (e, 2) on both sides of each inner edge, and its length (e,)."""
+        mesh, he = self.mesh, self.mesh.half_edges
+        k = he.interior
+        length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
+        return np.stack([he.face[k], he.face[he.twin[k]]], axis=1), length
+
+    @cached_property
     def _stiffness(self) -> csr_matrix:
         pairs = self.opened.seams.transpose(0, 2, 1).reshape(-1, 2)
         w = np.full(len(pairs), 0.5 * _ACROSS)
@@ -157,19 +165,16 @@ class Regions:
         )
         return self.potential.stiffness + links
 
-    def diffused(self, masses: Array, width: float | Array) -> Array:
-        """Diffuse masses (p, k) at the vertices of the opened mesh over a width, or widths (p,)."""
-        size = np.broadcast_to(1.0 / np.square(width), len(masses))
+    def diffused(self, masses: Array, widths: Array) -> Array:
+        """Diffuse masses (p, k) at the vertices of the opened mesh over widths (p,)."""
+        size = 1.0 / np.square(widths)
         solve = spd(diags(self.potential.mass * size) + self._stiffness)
         return np.stack([solve(column * size) for column in masses.T], axis=1)
 
     def widths(self, label: Ints, width: float) -> Array:
         """Return the width (p,) at vertices of the opened mesh: less where regions are thin."""
-        mesh, he = self.mesh, self.mesh.half_edges
-        k = he.interior
-        a, b = label[he.face[k]], label[he.face[he.twin[k]]]
-        length = np.linalg.norm(mesh.vertices[he.origin[k]] - mesh.vertices[he.dest[k]], axis=1)
-        count = int(label.max()) + 1
+        sides, length = self.beside
+        (a, b), count = label[sides].T, int(label.max()) + 1
         around = np.bincount(np.r_[a, b], np.tile(length * (a != b), 2), count)
         area = np.bincount(label, self.face_area, count)
         own = np.minimum(width, _THIN_REGION * area / np.maximum(around, 1e-300))[label]

@@ -149,17 +149,21 @@ def tried(
             break
         needs.append(float(max(trial.distance.max(), trial.strain.max())))
         progress = needs[-1] <= _PROGRESS * min(needs[:-1], default=0.0)
-        least = min(one.worst for one in found)
-        if number >= repairs and least > _CLOSE and not progress:
+        best = _best(found)
+        if number >= repairs and best.worst > _CLOSE and not progress:
             break
         own = _stricter(own, trial)
-        best = min(found, key=lambda one: one.worst)
         if best.worst <= _CLOSE:
             # Another try from where little was missing, with other weights.
             trial = best
         corrections.measure(trial.shape.design, trial.crossed)
         start, iterations = trial.untangled, _AGAIN
         pieces = _with_flips(trial)
+    return _best(found)
+
+
+def _best(found: list[Trial]) -> Trial:
+    """Return the trial that needs least."""
     return min(found, key=lambda one: one.worst)
 
 
