@@ -124,16 +124,18 @@ class CoarseCopy:
         smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
         thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
         fine = Mesh(smooth.vertices[thin.ids], thin.faces)
+        # Chords as long as edges of the copy are that far from a ball of the smallest radius.
+        radius = (step / _EDGE) ** 2 / distance
         own = thinned(
-            fine.vertices, fine.faces, count, _narrow(fine, thin.lines, distance), thin.lines
+            fine.vertices, fine.faces, count, _narrow(fine, thin.lines, radius), thin.lines
         )
         mesh, ids = Mesh(fine.vertices[own.ids], own.faces), thin.ids[own.ids]
         return cls(base, smooth, creases, wanted, mesh, ids, own.lines)
 
 
-def _narrow(mesh: Mesh, creases: Ints, distance: float) -> Ints:
+def _narrow(mesh: Mesh, creases: Ints, radius: float) -> Ints:
     """Return the vertices where the surface is so round that coarser triangles would cut it."""
-    bent = largest_curvatures(cut(mesh, creases).mesh) * distance > _ROUND
+    bent = largest_curvatures(cut(mesh, creases).mesh) * radius > _ROUND
     return np.setdiff1d(mesh.faces[bent], creases)
 
 

@@ -52,6 +52,9 @@ _APEX = 60.0
 _CORNER = 4
 #: Area of a region over the mean, below which it goes to a neighbour at first.
 _SMALL = 0.08
+#: Area of a part over its region, and the least one over the whole, below which it goes to a
+#: neighbour after a division.
+_HALF_OF, _TINIEST = 0.3, 0.0012
 #: Number of patches of regions that are divided.
 _FINER = 200
 #: Share of faces that seams should avoid from which on these regions are divided all the same.
@@ -189,15 +192,16 @@ class CopySearch:
         size = float(np.sqrt(self.regions.face_area.sum()))
         return self.settings.value(int(label.max()) + 1, seam / size)
 
-    def without_small(self, label: Ints, share: float = 0.0) -> Ints:
+    def without_small(self, label: Ints, share: float = 0.0, tiny: float = TINY) -> Ints:
         """Merge small regions with their neighbours.
 
-        They are smaller than a share of the mean, or so small that nobody would cut them.
+        They are smaller than a share of the mean, or so small that nobody would cut them: a share
+        of the whole.
         """
         faces, length = self.regions.beside
         while True:
             size = np.bincount(label, self.regions.face_area)
-            small = np.flatnonzero(size < max(share * size.mean(), TINY * size.sum()))
+            small = np.flatnonzero(size < max(share * size.mean(), tiny * size.sum()))
             a, b = label[faces].T
             for own in small[np.argsort(size[small], kind="stable")].tolist():
                 out, back = (
@@ -293,8 +297,12 @@ class CopySearch:
             reached[line] = True
         return disks(ground, edges)
 
-    def smaller(self, trial: Trial, excess: Array) -> Ints:
-        """Divide the regions whose excess (k,) is more than one."""
+    def smaller(self, trial: Trial, excess: Array, halves: float = _LITTLE) -> Ints:
+        """Divide the regions whose excess (k,) is more than one.
+
+        Those with an excess up to `halves` are divided in two, others as the estimate says. Parts
+        of regions that are small themselves may be smaller than others.
+        """
         label, mesh = trial.label, self.copy.mesh
         if self.mirror is not None:
             excess = np.maximum(excess, excess[self.mirror.partners(label)])
@@ -315,12 +323,14 @@ class CopySearch:
             ground = Ground.of(mesh, kept=ground.kept)
             regions = Regions(mesh, self.copy.lines)
         new = self.merged(start, level, _COMPACT[0], ground)
-        new = self._in_two(label, new, bad & (excess <= _LITTLE))
+        new = self._in_two(label, new, bad & (excess <= halves))
         new = self._sides(label, new, trial.folds_only)
         fair = regions.fair(new, self.width, rounds=1)
         # The others stay as they are, since a solve that begins with their shape needs that.
         new = _inside(label, bad, new, fair)
-        return self.alike(self.without_small(regions.connected(numbered(new))))
+        area = np.bincount(label, regions.face_area)
+        tiny = float(np.clip(_HALF_OF * area[bad].min(initial=np.inf) / area.sum(), _TINIEST, TINY))
+        return self.alike(self.without_small(regions.connected(numbered(new)), tiny=tiny))
 
     def _in_halves(self, label: Ints, level: float) -> Ints:
         """Divide regions that are far beyond a bound on the estimate at their silhouette.

@@ -51,6 +51,15 @@ _FOR_CREASES = 2
 _ITERATIONS, _FAIRER = 30, 4.0
 #: How often few regions of a trial are divided before an earlier one is tried.
 _REFINED = 3
+#: Excess of facets up to which pieces that have nothing else too large are taken: more solves, or
+#: smaller pieces, rarely have fewer.
+_PLEATED = 1.2
+#: Number of pieces in all divisions of one bound that are tried, and least number of divisions:
+#: where pieces are many, fewer are tried.
+_IN_ALL, _LEAST_WAYS = 150, 2
+#: Number of pieces, and share of the area in those that do not hold, relative to that with bounds
+#: before, from which on no lower bound is tried.
+_MANY_AT_FIRST, _NO_BETTER = 20, 0.9
 #: How often these are solved again where they nearly hold.
 _REPAIRS = 3
 #: Share of a region's area that two regions have in common which are the same.
@@ -117,11 +126,14 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     """Return the trials on the copy that hold, the best last; the best one if none does."""
     effort = search.settings.effort
     found: list[Trial] = []
+    failed: list[float] = []
     for number, level in enumerate(LEVELS, 1):
         labels = [one for one in search.divided(level) if not _known(one, found)]
         # Other bounds may take as many solves as those before.
         others = (len(LEVELS) - number) * max(len(found) // max(number - 1, 1), 1)
-        some = _first(search, labels[: effort.variants], others)
+        fewest = int(labels[0].max()) + 1 if labels else 1
+        ways = max(_LEAST_WAYS, min(effort.variants, _IN_ALL // fewest))
+        some = _first(search, labels[:ways], others)
         if some and not some[-1].holds:
             best = min(some, key=lambda one: one.worst)
             some += (more := _pursued(search, best))
@@ -129,6 +141,10 @@ def _of_copy(search: CopySearch) -> list[Trial]:
             some += _refined(search, best, others)
         found += some
         if any(one.holds for one in found) or (found and _hopeless(found[-1])):
+            break
+        failed.append(min((_failed(search, one) for one in some), default=1.0))
+        many = bool(some) and len(some[0].pieces) > _MANY_AT_FIRST
+        if many and number > 1 and failed[-1] > _NO_BETTER * min(failed[:-1]):
             break
     best = min(found, key=lambda one: _rank(one, search.settings))
     if not best.holds and not _hopeless(best):
@@ -239,6 +255,8 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
         if own.holds or _hopeless(own) or number == rounds - 1:
             break
         excess = own.of_regions(own.too_large)
+        if not (excess > 1.0).any() and not len(own.crossed) and own.facets <= _PLEATED:
+            break
         while others and _has(others[-1].label, trial.label, excess > 1.0):
             others.pop()
         refined += 1
@@ -247,7 +265,8 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
             continue
         # Parts that only pass through each other are solved again.
         some = (excess > 1.0).any()
-        label = search.smaller(own, excess) if some else trial.label
+        # One piece too many stays, since pieces of the design are not merged.
+        label = search.smaller(own, excess, np.inf) if some else trial.label
         if some and np.array_equal(label, trial.label):
             break
         trial, begin = replace(trial, label=label), own

@@ -51,8 +51,8 @@ _INSIDE = 1.05
 #: Factor on the weight of distances beyond those that are aimed at, where they are too large, and
 #: the distance over the allowed one from which on.
 _NEARER, _BARELY = 2.0, 1.02
-#: Range of the factor on the weight of fairness where faces are folded, and what each of them adds.
-_FAIRER, _SHARE_OF_FOLDS = (1.3, 8.0), 0.15
+#: Factor on the weight of the barrier against folds where faces are folded.
+_FACING_MORE = 20.0
 #: Excess up to which little is missing.
 _CLOSE = 1.1
 #: Ratio of what a result needs to the least before, up to which it becomes much less.
@@ -147,7 +147,7 @@ def tried(
                 continue
         if not _repairable(trial, known) or (start is None and trial.worst > most):
             break
-        needs.append(float(max(trial.distance.max(), trial.strain.max())))
+        needs.append(float(max(trial.distance.max(), trial.strain.max(), trial.folds.sum())))
         progress = needs[-1] <= _PROGRESS * min(needs[:-1], default=0.0)
         best = _best(found)
         if number >= repairs and best.worst > _CLOSE and not progress:
@@ -215,8 +215,7 @@ def _stricter(options: Options, trial: Trial) -> Options:
         reach, weight = options.reach * _BELOW / far, nearer * options.w_reach
         options = replace(options, reach=reach, w_reach=weight)
     if trial.folds.any():
-        fairer = float(np.clip(_SHARE_OF_FOLDS * trial.folds.sum(), *_FAIRER))
-        options = replace(options, w_fairness=fairer * options.w_fairness)
+        options = replace(options, w_facing=_FACING_MORE * options.w_facing)
     elif trial.facets > 1.0:
         options = replace(options, w_fairness=_SMOOTHER * options.w_fairness)
     if strain > 1.0:
