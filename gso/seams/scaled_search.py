@@ -49,6 +49,9 @@ _FOR_CREASES = 2
 #: Iterations of the solve of the design, from the shape of the copy, and the factor on the weight
 #: of fairness, since the design has finer faces.
 _ITERATIONS, _FAIRER = 30, 4.0
+#: Faces of the design over those of the copy from which on its weights grow, and the power of that:
+#: curvature and fairness of finer meshes weigh less.
+_FINE, _POWER = 4.0, 3.0
 #: How often few regions of a trial are divided before an earlier one is tried.
 _REFINED = 3
 #: Excess of facets up to which pieces that have nothing else too large are taken: more solves, or
@@ -289,6 +292,14 @@ def _carried(search: CopySearch, trial: Trial, begin: Trial | None) -> Trial:
     if search.plane is not None:
         start = symmetric_points(smooth.design, start, search.plane)
     design = smooth.design.replaced(divided.moved(copy.base.vertices))
+    own = trial.options
+    finer = max(1.0, len(divided.mesh.faces) / (_FINE * len(copy.mesh.faces))) ** _POWER
+    options = replace(
+        own,
+        w_fairness=_FAIRER * finer * own.w_fairness,
+        w_curvature=finer * own.w_curvature,
+        w_reach=finer * own.w_reach,
+    )
     return tried(
         trial.label,
         divided,
@@ -299,7 +310,7 @@ def _carried(search: CopySearch, trial: Trial, begin: Trial | None) -> Trial:
         repairs=_REPAIRS,
         executor=search.settings.executor,
         width=trial.width,
-        options=replace(trial.options, w_fairness=_FAIRER * trial.options.w_fairness),
+        options=options,
     )
 
 
