@@ -124,8 +124,9 @@ class CoarseCopy:
         smooth = smoothed_within(base, _WIDTH * distance, _SMOOTH * distance, creases)
         thin = thinned(smooth.vertices, smooth.faces, _FINE * count, lines=creases)
         fine = Mesh(smooth.vertices[thin.ids], thin.faces)
-        # Chords as long as edges of the copy are that far from a ball of the smallest radius.
-        radius = (step / _EDGE) ** 2 / distance
+        # Edges that are long for the distance cut surfaces that are less round, but no nearly flat
+        # ones, for which the copy would have all vertices of the design.
+        radius = min((step / _EDGE) ** 2 / distance, step)
         own = thinned(
             fine.vertices, fine.faces, count, _narrow(fine, thin.lines, radius), thin.lines
         )

@@ -129,7 +129,7 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     """Return the trials on the copy that hold, the best last; the best one if none does."""
     effort = search.settings.effort
     found: list[Trial] = []
-    failed: list[float] = []
+    least = np.inf
     for number, level in enumerate(LEVELS, 1):
         labels = [one for one in search.divided(level) if not _known(one, found)]
         # Other bounds may take as many solves as those before.
@@ -145,10 +145,11 @@ def _of_copy(search: CopySearch) -> list[Trial]:
         found += some
         if any(one.holds for one in found) or (found and _hopeless(found[-1])):
             break
-        failed.append(min((_failed(search, one) for one in some), default=1.0))
+        failed = min((_failed(search, one) for one in some), default=1.0)
         many = bool(some) and len(some[0].pieces) > _MANY_AT_FIRST
-        if many and number > 1 and failed[-1] > _NO_BETTER * min(failed[:-1]):
+        if many and failed > _NO_BETTER * least:
             break
+        least = min(least, failed)
     best = min(found, key=lambda one: _rank(one, search.settings))
     if not best.holds and not _hopeless(best):
         # Most of the design holds in no division: go on with the one that holds in most places.
@@ -258,7 +259,8 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
         if own.holds or _hopeless(own) or number == rounds - 1:
             break
         excess = own.of_regions(own.too_large)
-        if not (excess > 1.0).any() and not len(own.crossed) and own.facets <= _PLEATED:
+        some = (excess > 1.0).any()
+        if not some and not len(own.crossed) and own.facets <= _PLEATED:
             break
         while others and _has(others[-1].label, trial.label, excess > 1.0):
             others.pop()
@@ -267,7 +269,6 @@ def _of_design(search: CopySearch, trials: list[Trial]) -> Trial:
             trial, begin, refined = others.pop(), None, 0
             continue
         # Parts that only pass through each other are solved again.
-        some = (excess > 1.0).any()
         # One piece too many stays, since pieces of the design are not merged.
         label = search.smaller(own, excess, np.inf) if some else trial.label
         if some and np.array_equal(label, trial.label):
