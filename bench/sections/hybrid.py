@@ -6,15 +6,16 @@ the seed, or read from a set (``data=DIR``).
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import time
 from collections.abc import Iterable
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from designs.base import shuffled, without
-from harness import BENCH, PRESETS, axes_of, energy, progress, quietly, tabulate, timed
+from harness import BENCH, axes_of, energy, progress, quietly, tabulate, timed
 from report.store import Store
 from report.surfaces import Surfaces, opened, screened
 
@@ -22,9 +23,8 @@ import gso
 from gso import hybrid
 from gso.executors import open_executor
 from gso.hierarchy import resample
-from gso.mesh import Mesh
-from gso.net import available
-from gso.net import tasks as net_tasks
+from gso.hybrid import time_model
+from gso.io.json_file import write_json
 from gso.tno import Start, optimize
 
 #: Task and keywords.
@@ -34,18 +34,22 @@ CASES: dict[str, Case] = {
     "balanced": ("developable", {}),
     "accurate": ("developable", {"options": "accurate"}),
     "jiang2020": ("developable", {"options": "jiang2020"}),
-    "strain": ("flatten", {}),
-    "lengths": ("flatten", {"formulation": "lengths"}),
+    "isometry": ("developable", {"formulation": "isometry"}),
+    "max_strain=0.5%": ("developable", {"max_strain": "0.5%"}),
 }
 #: Numbers of iterations at which the curve of the section "anytime" has points.
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
-#: Vertices along the sides of the section "sizes".
-SIZES = (32, 64, 128, 256)
-#: Share by which the sections "guard" and "general" stretch designs along x, to measure how much
-#: the cold solves of two practically equal designs differ.
+#: Vertices along the sides of the section "sizes", by preset, and surfaces relative to the first.
+SIZES = {"balanced": (64, 128, 256, 512), "accurate": (64, 128, 256)}
+SHARES = {64: 1.0, 128: 0.5, 256: 0.25, 512: 0.125}
+#: Share of the energy that the cold solve "ended as early" leaves to further iterations: that of
+#: :func:`gso.hybrid.solve`.
+EARLY = 3e-3
+#: A program that loads PyTorch and the default net.
+LOAD = "import numpy as np, gso; gso.net.predict(np.dstack([*np.mgrid[:9.0, :9.0], np.eye(9)]))"
+#: Share by which the section "guard" stretches designs along x, to measure how much the cold solves
+#: of two practically equal designs differ.
 STRETCH = 1e-6
-#: Side of the hole in general meshes, as a share of the mesh's side; every other mesh has no hole.
-HOLES = (0.0, 0.15)
 
 
 def split(name: str, data: Path | None) -> Surfaces:
@@ -65,10 +69,12 @@ def first(count: int, data: Path | None) -> list[np.ndarray]:
 def compared(
     designs: Iterable[Any], case: Case, workers: int | None = 0, stretched: bool = False
 ) -> dict[str, np.ndarray]:
-    """Solve every design cold and hybrid: seconds, energies, and which used the net's start.
+    """Solve every design cold and hybrid: CPU seconds, energies, strains, and use of the net.
 
-    Times are meaningful with ``workers=0`` only. With `stretched`, the energies of cold solves of
-    the stretched designs are included; they show how much such minima differ by chance.
+    The solves of a design follow each other in one process. "solver" is without pattern and
+    verdict, "total" with them. Times are meaningful with ``workers=0`` only. With `stretched`, the
+    energies of cold solves of the stretched designs are included; they show how much such minima
+    differ by chance.
     """
     rows = []
     solved = partial(_solved, case, stretched)
@@ -80,68 +86,125 @@ def compared(
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
+def _cpu(function: Any, *given: Any, **keywords: Any) -> tuple[Any, float]:
+    """Call a function without warnings; return its result and the CPU seconds."""
+    clock = time.process_time()
+    value = quietly(function, *given, **keywords)
+    return value, time.process_time() - clock
+
+
 def _solved(case: Case, stretched: bool, design: Any) -> dict[str, float]:
     task, keywords = case
-    cold, slow = timed(quietly, optimize, design, task=task, **keywords)
-    warm, quick = timed(quietly, hybrid.solve, design, task=task, **keywords)
+    given = {"task": task, **keywords}
+    # Energies are those without a verdict: where a result is not usable, another request is solved.
+    cold, cold_solver = _cpu(optimize, design, **given, verdict=False)
+    warm, warm_solver = _cpu(hybrid.solve, design, **given, verdict=False)
+    judged_cold, cold_total = _cpu(optimize, design, **given)
+    judged_warm, warm_total = _cpu(hybrid.solve, design, **given)
+    strains = [max(r.metrics["strain_max"], 1e-9) for r in (judged_warm, judged_cold)]
     least = max(energy(cold), 1e-300)
     found = {
-        "cold": slow,
-        "hybrid": quick,
-        "net": warm.seconds["net"],
+        "cold solver": cold_solver,
+        "cold total": cold_total,
+        "hybrid solver": warm_solver,
+        "hybrid total": warm_total,
         "started": warm.warm_start == "net",
         "energy": energy(warm) / least,
+        "strain": strains[0] / strains[1],
     }
+    if "max_strain" not in keywords:
+        begin = Start(None, remaining=EARLY)
+        early, found["early solver"] = _cpu(optimize, design, **given, verdict=False, x0=begin)
+        found["early energy"] = energy(early) / least
     if stretched:
         mesh = gso.as_mesh(design)
         near = mesh.replaced(mesh.vertices * [1.0 + STRETCH, 1.0, 1.0])
-        again, _ = timed(quietly, optimize, near, task=task, **keywords)
-        found["stretched"] = energy(again) / least
+        found["stretched"] = energy(quietly(optimize, near, **given)) / least
     return found
 
 
 def ratios(energies: np.ndarray) -> dict[str, float]:
     """Summarise energies relative to the cold solve's."""
-    shares = {f"% <= {most}": 100.0 * float((energies <= most).mean()) for most in (1.01, 1.05)}
-    return {"energy": float(np.median(energies)), **shares, "worst": float(energies.max())}
+    shares = {f"% <= {most}": 100.0 * float((energies <= most).mean()) for most in (1.005, 1.05)}
+    high = float(np.quantile(energies, 0.9))
+    return {"energy": float(np.median(energies)), "9 in 10": high, **shares} | {
+        "worst": float(energies.max())
+    }
 
 
-def costs(found: dict[str, np.ndarray]) -> dict[str, float]:
-    """Summarise times and energies, cold and hybrid."""
-    times = {f"{k} ms": 1e3 * float(np.median(found[k])) for k in ("cold", "hybrid", "net")}
-    share = float(np.median(found["hybrid"] / found["cold"]))
-    started = 100.0 * float(found["started"].mean())
-    return times | {"of the time": share, "started %": started, **ratios(found["energy"])}
+def costs(found: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Summarise times and energies, cold and hybrid, and of a cold solve that ends as early."""
+    out = {
+        "n": len(found["energy"]),
+        "cold ms": 1e3 * float(np.median(found["cold solver"])),
+        "total ms": 1e3 * float(np.median(found["cold total"])),
+    }
+    for part in ("solver", "total"):
+        share = found[f"hybrid {part}"] / found[f"cold {part}"]
+        out |= {f"{part} ratio": float(np.median(share)), f"{part} worst": float(share.max())}
+    out |= {"started %": 100.0 * float(found["started"].mean()), **ratios(found["energy"])}
+    out["strain 9 in 10"] = float(np.quantile(found["strain"], 0.9))
+    early: dict[str, Any] = {"early ratio": "", "early energy": ""}
+    if "early solver" in found:
+        share = found["early solver"] / found["cold solver"]
+        early["early ratio"] = float(np.median(share))
+        early["early energy"] = float(np.median(found["early energy"]))
+    return out | early
 
 
-def speed(n: int = 64, data: Path | None = None) -> dict[str, Any]:
+def speed(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     """Print time and energy of the same surfaces, cold and from the net's result."""
     chosen = first(n, data)
     rows: dict[Any, dict[str, Any]] = {}
     for name, case in CASES.items():
-        if net_tasks.get(case[0]).default not in available(case[0]):
-            print(f"{name}: no net comes with the package")
-            continue
-        compared(chosen[:2], case)  # imports and code generation of the first use
-        rows[name] = costs(compared(progress(chosen, name), case))
-    cold = float(np.median([timed(quietly, optimize, p, task="denoise")[1] for p in chosen]))
-    blank = dict.fromkeys(next(iter(rows.values()), ()), "")
-    rows["denoise, in closed form: no start can help"] = blank | {"cold ms": 1e3 * cold}
-    title = f"Speed: medians over {len(chosen)} surfaces; energies over the cold ones"
+        compared(chosen[:1], case)  # imports and code generation of the first use
+        some = chosen if name in ("balanced", "accurate") else chosen[: max(n // 4, 1)]
+        rows[name] = costs(compared(progress(some, name), case))
+    title = "Speed: CPU time; medians; energies and strains over the cold ones"
     return tabulate(title, ["case"], rows)
 
 
-def sizes(n: int = 4, data: Path | None = None) -> dict[str, Any]:
-    """Print time and energy on other sizes, which ``gso.hybrid.time_model`` was chosen from."""
-    chosen, rows = first(n, data), {}
-    for side, preset in product(SIZES, PRESETS[1:]):
-        grids = [resample(np.asarray(p, float), side, side) for p in chosen]
-        quietly(hybrid.solve, grids[0], options=preset)
-        shown_grids = progress(grids, f"{side} {preset}")
-        found = compared(shown_grids, ("developable", {"options": preset}))
-        rows[f"{side} x {side}", preset] = costs(found)
-    title = f"Sizes: medians over {len(chosen)} surfaces, PyTorch loaded before"
+def sizes(n: int = 32, data: Path | None = None) -> dict[str, Any]:
+    """Print time and energy on other sizes, PyTorch loaded before."""
+    rows = {key: costs(found) for key, found in _by_size(n, data, "test").items()}
+    title = "Sizes: CPU time; medians; energies and strains over the cold ones"
     return tabulate(title, ["grid", "preset"], rows)
+
+
+def _by_size(n: int, data: Path | None, name: str) -> dict[tuple[str, str], dict[str, np.ndarray]]:
+    """Compare surfaces of a split on grids of all sizes; fewer of the larger ones."""
+    surfaces, found = split(name, data), {}
+    for preset, sides in SIZES.items():
+        for side in sides:
+            count = min(max(round(n * SHARES[side]), 2), len(surfaces))
+            grids = [resample(np.asarray(surfaces[k], float), side, side) for k in range(count)]
+            case: Case = ("developable", {"options": preset})
+            quietly(hybrid.solve, grids[0], options=preset)
+            shown = progress(grids, f"{side} {preset}")
+            found[f"{side} x {side}", preset] = compared(shown, case)
+    return found
+
+
+def model(n: int = 32, data: Path | None = None) -> dict[str, Any]:
+    """Measure on the validation split what decides where nets are used, and write it.
+
+    The file is that of :mod:`gso.hybrid.time_model`.
+    """
+    presets: dict[str, list[dict[str, float]]] = {preset: [] for preset in SIZES}
+    for (grid, preset), found in _by_size(n, data, "validation").items():
+        high = {name: float(np.quantile(found[name], 0.9)) for name in ("energy", "strain")}
+        row = {
+            "vertices": int(grid.split(" ")[0]) ** 2,
+            "cold": float(np.median(found["cold total"])),
+            "net": float(np.median(found["hybrid total"])),
+        }
+        presets[preset].append({k: float(f"{v:.4g}") for k, v in (row | high).items()})
+    runs = [timed(subprocess.run, [sys.executable, "-c", LOAD], check=True)[1] for _ in range(3)]
+    load = round(min(runs), 2)
+    write_json(time_model.FILE, {"load": load, "presets": presets})
+    rows = {(name, str(row["vertices"])): row for name in presets for row in presets[name]}
+    title = f"Model: total CPU seconds (medians), energy and strain (nine in ten); load {load} s"
+    return tabulate(title, ["preset", "vertices"], rows)
 
 
 def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
@@ -157,16 +220,6 @@ def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
     return tabulate(title, ["surfaces", "solve"], rows)
 
 
-def general(n: int = 32, data: Path | None = None) -> dict[str, Any]:
-    """Print energies on triangulated patches in random order, half of them with a hole."""
-    chosen = first(n, data)
-    meshes = [patch(p, HOLES[k % len(HOLES)], seed=k) for k, p in enumerate(chosen)]
-    found = compared(progress(meshes, "general"), CASES["balanced"], stretched=True)
-    rows = _against_chance(f"{len(meshes)} meshes", found)
-    title = "General meshes, triangulated in random order, half with a hole"
-    return tabulate(title, ["meshes", "solve"], rows)
-
-
 def _against_chance(name: str, found: dict[str, np.ndarray]) -> dict[Any, dict[str, float]]:
     """Return rows of the hybrid solves, and of the cold ones of stretched designs."""
     started = {"started %": 100.0 * float(found["started"].mean())}
@@ -175,16 +228,6 @@ def _against_chance(name: str, found: dict[str, np.ndarray]) -> dict[Any, dict[s
         (name, "hybrid"): started | ratios(found["energy"]),
         (name, stretched): {"started %": ""} | ratios(found["stretched"]),
     }
-
-
-def patch(grid: np.ndarray, hole: float, seed: int) -> Mesh:
-    """Return a grid as triangles in random order, with a hole in its middle."""
-    whole, rng = Mesh.from_grid(grid), np.random.default_rng(seed)
-    sides = (np.linspace(-1, 1, n) for n in grid.shape[:2])
-    at = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
-    middle = np.abs(at.reshape(-1, 2)[whole.triangles].mean(axis=1)).max(axis=1)
-    points, faces = shuffled(*without(whole.vertices, whole.triangles, middle < hole), rng)
-    return Mesh(points, faces[rng.permutation(len(faces))])
 
 
 def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") -> dict[str, Any]:
@@ -215,4 +258,4 @@ def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") ->
     return tabulate(title, ["solve", "iterations"], rows)
 
 
-SECTIONS = (speed, sizes, guard, general, anytime)
+SECTIONS = (speed, sizes, model, guard, anytime)

@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from itertools import islice
@@ -19,8 +19,9 @@ from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
+from gso.hybrid import two_starts
 from gso.hybrid.time_model import net_saves_time
-from gso.hybrid.warm_start import Prediction, predictions
+from gso.hybrid.warm_start import SIZE, Prediction, predictions
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.net.catalogue import NetLike
@@ -28,9 +29,10 @@ from gso.pattern import Pattern
 from gso.pipeline import component_solves
 from gso.pipeline.case import Case
 from gso.pipeline.normalise import Canonical
-from gso.quantities import as_length
+from gso.quantities import as_length, as_positive
 from gso.result import Result
 from gso.status import Progress, Status
+from gso.tasks.developable import Options as DevelopableOptions
 from gso.tno import Start, check, optimize
 from gso.typing import Array, Keywords, MeshLike
 
@@ -39,9 +41,16 @@ _BATCH = 64
 #: Passes of a net for a warm start. A solve on a coarser grid makes the large-scale changes of
 #: further passes as well, in less time.
 _PASSES = 1
-#: Relative energy decrease of an iteration at which a solve from a net's result stops: most of
-#: the remaining time would gain only a few per mille.
+#: Note on results that do not begin with the net's.
+_LOST = "the design's own minimum on a coarse grid is lower than that from the net's result"
+#: Shares of the energy that are left to further iterations: with less than the effort of a cold
+#: solve, and with the same.
+_LEFT = (3e-3, 3e-4)
+#: Relative energy decrease of an iteration at which other solves from a net's result stop.
 _NEARLY = 2e-3
+#: Vertices along the longer side of a grid, relative to the net's, from which on the cold start is
+#: solved on a coarser grid, too: with less than the effort of a cold solve, and with the same.
+_TWO_STARTS = (4, 2)
 
 
 def solve(
@@ -51,33 +60,37 @@ def solve(
     net: NetLike | None = None,
     polish: bool | int = True,
     sparing: bool = False,
+    effort: float = 0.5,
     **keywords: Any,
 ) -> Result:
     """Solve from a warm start that a net predicts.
 
+    The net runs at its own size, and its displacements are carried to the design's grid. Large
+    grids are first solved at the net's size, from the design and from the net's result; the lower
+    minimum of the two is refined.
+
     The solve is a cold start, the same as :func:`gso.tno.optimize`, in these cases:
 
-    - No net is available: none for the task, or PyTorch is not installed.
-    - The design is small, cannot be resampled to a grid, or has far more curvature than the
-      training data.
-    - The net's result is not finite, has inverted cells in a flat image, or has a higher
-      energy than the cold start.
+    - No net is available: none for the task, or PyTorch is not installed. Warm starts of the task
+      "flatten" were not found to help.
+    - The design is no grid: warm starts of other meshes were not found to help. It is small, or
+      has far more curvature than the training data.
+    - The net's result is not finite, or has a higher energy than the cold start.
 
     The result's `notes` then say so, and its `warm_start` is "cold".
 
     Parameters
     ----------
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
-        The design. Nets take grids, and components with a boundary and without handles:
-        these are resampled to a grid, and the displacement is interpolated back.
+        The design. With ``polish=False`` nets take components with a boundary and without
+        handles, too: these are resampled to a grid, and the displacement is interpolated back.
     task : str
-        As for :func:`gso.tno.optimize`; nets make starts for "developable" and "flatten". The
-        net for "denoise" makes no start, and is used only with ``polish=False``.
+        As for :func:`gso.tno.optimize`; nets make starts for "developable". Those for "flatten"
+        and "denoise" are used only with ``polish=False``.
     net : str, path or net, optional
         As `model` of :func:`gso.net.predict`; the task's default when not given.
     polish : bool or int
-        True: solve from the net's result, until an iteration lowers the energy by less than
-        0.2 % (or the options' tolerance, where that is larger). A number: at most so many
+        True: solve from the net's result, as `effort` says. A number: at most so many
         iterations, with or without a net.
         False: the net's result without iterations, whatever its energy; it is still measured,
         and hard constraints and `max_deviation` are enforced. `target_curvature` and
@@ -85,6 +98,11 @@ def solve(
     sparing : bool
         Use the net only where it was found to save time: on large grids, by the formulation
         "curvature". Elsewhere the result is that of :func:`gso.tno.optimize`.
+    effort : float
+        Time to aim for, relative to a cold solve, by the formulation "curvature" without limits
+        and constraints. Below 1 a solve from a net's result ends when further iterations are
+        expected to lower the energy by less than 0.3 % of it. From 1 on these are 0.03 %, and the
+        start is corrected for longer: the result has less energy than that of a cold solve.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
         `max_deviation`, `max_strain`, `target_curvature`, `unit`, `callback`, `verdict`.
@@ -114,11 +132,13 @@ def solve(
     """
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
+    effort = as_positive(effort, "effort")
     design = as_mesh(mesh)
     design.check_joined()
     pieces = _pieces(design, task, sparing, keywords)
     if pieces:
-        result = _each(design, pieces, task, keywords | {"net": net, "polish": polish})
+        further = {"net": net, "polish": polish, "effort": effort}
+        result = _each(design, pieces, task, keywords | further)
         result.seconds["total"] = time.perf_counter() - clock
         return result
     prediction = Prediction()
@@ -126,7 +146,7 @@ def solve(
         (prediction,) = predictions(
             [design], task=task, net=net, passes=_passes(polish), alone=polish is False
         )
-    result = _finished(design, prediction, task, polish, keywords)
+    result = _finished(design, prediction, task, polish, effort, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
 
@@ -138,6 +158,7 @@ def solve_many(
     net: NetLike | None = None,
     polish: bool | int = True,
     sparing: bool = False,
+    effort: float = 0.5,
     workers: int | None = None,
     scheduler: str | None = None,
     executor: Executor | None = None,
@@ -149,7 +170,7 @@ def solve_many(
     ----------
     meshes : iterable
         Anything :func:`solve` takes; read in blocks, so that a generator of any length fits.
-    task, net, polish, sparing, **keywords
+    task, net, polish, sparing, effort, **keywords
         As for :func:`solve`; a `callback` is ignored.
     workers : int, optional
         Number of worker processes; the number of cores when not given, 0 to solve in this one.
@@ -172,7 +193,7 @@ def solve_many(
     """
     keywords.pop("callback", None)
     polish = _checked(task, polish, keywords)
-    work = partial(_one, task, polish, keywords)
+    work = partial(_one, task, polish, as_positive(effort, "effort"), keywords)
     worth = partial(net_saves_time, task=task, keywords=keywords, many=True) if sparing else None
     passes, alone = _passes(polish), polish is False
     ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
@@ -253,10 +274,12 @@ def _read(mesh: MeshLike) -> Mesh | GSOError:
         return error
 
 
-def _one(task: str, polish: bool | int, keywords: Keywords, started: _Started) -> Result:
+def _one(
+    task: str, polish: bool | int, effort: float, keywords: Keywords, started: _Started
+) -> Result:
     if isinstance(started.design, GSOError):
         raise started.design
-    result = _finished(started.design, started.prediction, task, polish, keywords)
+    result = _finished(started.design, started.prediction, task, polish, effort, keywords)
     result.metrics  # noqa: B018 - computed here, in the worker process
     return result
 
@@ -287,6 +310,7 @@ def _finished(
     prediction: Prediction,
     task: str,
     polish: bool | int,
+    effort: float,
     keywords: Keywords,
 ) -> Result:
     """Solve from a prediction if it is valid, else from a cold start."""
@@ -295,7 +319,13 @@ def _finished(
         try:
             refused = _unsound(design, prediction.points)
             if not refused:
-                result = _polished(design, prediction.points, task, polish, keywords)
+                start = _start(design, prediction.points, task, polish, effort, keywords)
+                result = optimize(design, task=task, x0=start, **keywords)
+                if start.source == "cold":
+                    result.notes += (_LOST,)
+                flat = prediction.points.shape[1] == 2 and result.warm_start == "net"
+                if flat and not keywords["constraints"]:
+                    _place(result)
         except MeshError as error:
             # The start may have no area. An error in the design is raised again below.
             refused = str(error)
@@ -319,26 +349,34 @@ def _unsound(design: Mesh, points: Array) -> str:
     return f"its result turns {turned} corner triangles over" if turned else ""
 
 
-def _polished(
+def _start(
     design: Mesh,
     points: Array,
     task: str,
     polish: bool | int,
+    effort: float,
     keywords: Keywords,
-) -> Result:
-    """Solve from a net's result."""
-    # Without iterations the net's result itself is wanted, whatever its energy.
-    start = Start(
-        points,
-        source="net",
-        guarded=polish is not False,
-        iterations=None if polish is True else int(polish),
-        tolerance=_NEARLY,
-    )
-    result = optimize(design, task=task, x0=start, **keywords)
-    if points.shape[1] == 2 and result.warm_start == "net" and not keywords["constraints"]:
-        _place(result)
-    return result
+) -> Start:
+    """Return the start that a net's result makes."""
+    request = check(task, **{k: v for k, v in keywords.items() if k in ("formulation", "options")})
+    options = request.options
+    limits = ("max_deviation", "max_strain", "target_curvature")
+    bound = keywords["constraints"] or any(keywords.get(name) is not None for name in limits)
+    plain = isinstance(options, DevelopableOptions) and options.variables in ("normal", "free")
+    if polish is not True or not plain or bound or design.grid_shape is None:
+        # Without iterations the net's result itself is wanted, whatever its energy.
+        most = None if polish is True else int(polish)
+        guarded = polish is not False
+        return Start(points, "net", guarded=guarded, iterations=most, tolerance=_NEARLY)
+    left = _LEFT[effort >= 1.0]
+    start = Start(points, "net", guarded=True, remaining=left, resolution=SIZE)
+    large = max(design.grid_shape) >= _TWO_STARTS[effort >= 1.0] * SIZE
+    if large and isinstance(options, DevelopableOptions):
+        solve = partial(optimize, task=task, formulation=request.formulation)
+        better = two_starts.refined(design, points, SIZE, options, solve)
+        if better is not None:
+            return replace(better, guarded=True, remaining=left)
+    return start
 
 
 def _place(result: Result) -> None:

@@ -1,23 +1,31 @@
-"""Criterion for whether a net's warm start saves more time than it costs."""
+"""Criterion for whether a net's warm start saves more time than it costs, at the same quality."""
 
 from __future__ import annotations
 
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
 from gso.mesh import Mesh
 from gso.tno import check
-from gso.typing import Keywords
+from gso.typing import Array, Json, Keywords
 
-#: Number of vertices from which a net saves time, by the unknowns of the last stage: for one
-#: design, including the time to load PyTorch, and for one of many.
-#: ``python bench/run_all.py --only hybrid.sizes`` prints the times.
-_FREE = (10_000, 2_500)
-_OFFSETS = (40_000, 10_000)
+#: Measurements, which ``python bench/run_all.py --only hybrid.model`` makes anew.
+FILE = Path(__file__).with_name("measured.json")
+#: Largest energy and strain, relative to a cold solve, of nine in ten surfaces, and largest share
+#: of its time, for which a net is used.
+_ENERGY, _STRAIN, _TIME = 1.005, 1.05, 0.95
+#: Preset whose measurements hold for a kind of unknowns.
+_PRESETS = {"normal": "balanced", "free": "accurate"}
 
 
 def net_saves_time(design: Mesh, task: str, keywords: Keywords, *, many: bool = False) -> bool:
     """Return whether the task's net is expected to save time, at the same quality.
 
-    It was found to only for developable solves of grids by curvature. Solves with bounds or
-    constraints were not measured, and return False.
+    It was measured for developable solves of grids by curvature. For other solves, and with bounds
+    or constraints, it is not expected to.
 
     Parameters
     ----------
@@ -25,16 +33,54 @@ def net_saves_time(design: Mesh, task: str, keywords: Keywords, *, many: bool = 
     task, keywords
         As for :func:`gso.hybrid.solve`.
     many : bool
-        Whether it is one of many designs.
+        Whether it is one of many designs, for which PyTorch is loaded once.
     """
     request = check(task, keywords.get("formulation"), keywords.get("options"))
     by_curvature = (task, request.formulation) == ("developable", "curvature")
     if not by_curvature or design.grid_index is None:
         return False
     bounds = ("max_deviation", "max_strain", "target_curvature")
-    if any(keywords.get(name) is not None for name in bounds):
+    if any(keywords.get(name) is not None for name in bounds) or keywords.get("constraints"):
         return False
-    if keywords.get("constraints"):
+    preset = _PRESETS.get(getattr(request.options, "variables", ""))
+    if preset is None:
         return False
-    least = _FREE if getattr(request.options, "variables", None) == "free" else _OFFSETS
-    return len(design.vertices) >= least[many]
+    cold, warm = expected(preset, len(design.vertices))
+    load = 0.0 if many else float(measured()["load"])
+    return warm + load <= _TIME * cold
+
+
+def expected(preset: str, vertices: int) -> tuple[float, float]:
+    """Return the expected seconds of a cold solve and of one from a net's result.
+
+    Times are interpolated in proportion to powers of the number of vertices. The second is infinite
+    for grids below the smallest measured one from which on the quality is the same.
+
+    Parameters
+    ----------
+    preset : {"balanced", "accurate"}
+    vertices : int
+        Number of vertices of the grid.
+    """
+    rows = measured()["presets"][preset]
+    good = [row["energy"] <= _ENERGY and row["strain"] <= _STRAIN for row in rows]
+    least = next((k for k in range(len(rows)) if all(good[k:])), len(rows))
+    sizes = np.array([float(row["vertices"]) for row in rows])
+    cold, warm = (_power(vertices, sizes, [row[name] for row in rows]) for name in ("cold", "net"))
+    known = least < len(rows) and vertices >= 0.9 * sizes[least]
+    return cold, warm if known else float("inf")
+
+
+def _power(at: float, sizes: Array, seconds: list[float]) -> float:
+    """Interpolate a power law piecewise, continued by its first and last piece."""
+    x, y = np.log(sizes), np.log(seconds)
+    k = int(np.clip(np.searchsorted(x, np.log(at)) - 1, 0, len(x) - 2))
+    slope = (y[k + 1] - y[k]) / (x[k + 1] - x[k])
+    return float(np.exp(y[k] + slope * (np.log(at) - x[k])))
+
+
+@cache
+def measured() -> Json:
+    """Return the measurements: seconds to load PyTorch and a net, and rows by preset and size."""
+    found: Json = json.loads(FILE.read_text())
+    return found

@@ -18,8 +18,8 @@ from gso.net import tasks
 from gso.net.catalogue import NetLike, available, chain
 from gso.typing import Array
 
-#: Vertices along each side of the grid that a mesh is resampled to.
-_SIZE = 64
+#: Vertices along each side of the grids that nets see.
+SIZE = 64
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
 _SMALLEST = 8
 
@@ -87,9 +87,11 @@ def predictions(
     for k, design in enumerate(designs):
         clock = time.perf_counter()
         try:
+            if not alone and design.grid is None:
+                raise MeshError("on meshes that are not grids, nets were not found to help")
             grid, patch = _seen(design, task)
             if not alone:
-                _check_curvature(design, grid)
+                _check_curvature(grid)
             sizes.setdefault(grid.shape, []).append((k, grid, patch))
         except MeshError as error:
             found[k] = Prediction(None, time.perf_counter() - clock, name, str(error))
@@ -142,24 +144,18 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
     count = int(design.used.sum())
     if count < _SMALLEST**2:
         raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")
-    patch = as_patch(design, _SIZE)
+    patch = as_patch(design, SIZE)
     return patch.grid, patch
 
 
-def _check_curvature(design: Mesh, grid: Array) -> None:
+def _check_curvature(grid: Array) -> None:
     """Refuse surfaces far more curved than the training data, where nets are unreliable."""
     curved = metrics.loss_gc(grid)
-    if curved <= CURVED:
-        return
-    what = "mean |K| in the unit ball"
-    if design.grid is None:
-        own = metrics.loss_gc_worst(design)
-        what += (
-            f" is {own:.3g} on the mesh; on the grid of {len(grid)} x {len(grid)} for the net it"
+    if curved > CURVED:
+        raise MeshError(
+            f"mean |K| in the unit ball is {curved:.3g}, and above {CURVED:.2g} is too far from "
+            "what nets are taught"
         )
-    raise MeshError(
-        f"{what} is {curved:.3g}, and above {CURVED:.2g} is too far from what nets are taught"
-    )
 
 
 def _predicted(

@@ -183,7 +183,11 @@ class Run:
     def solve_stages(self, plan: Plan, options: Options) -> PlanState:
         """Solve the stages of a plan with at least one, the last one until hard terms hold."""
         coordinates, entered = plan.start, None
-        least = 0.0 if plan.cold_start is None else self.case.request.start.tolerance
+        start = self.case.request.start
+        begun = plan.cold_start is not None
+        least = start.tolerance if begun else 0.0
+        # A cold solve is the same whether there was a start that was dropped or not.
+        remaining = start.remaining if begun or start.points is None else 0.0
         stages, further = list(plan.stages), 0
         # Coarser grids use the kernels of the finest, which are compiled if that one is large.
         counts = largest_counts((stage.items, stage.layout) for stage in stages)
@@ -193,13 +197,14 @@ class Run:
             self.timings.setup += time.perf_counter() - clock
             last = number >= len(plan.stages) - 1
             # A warm start is close to the solution: reserve iterations for the last stage.
-            reserved = 0 if last or plan.cold_start is None else plan.stages[-1].iterations
+            reserved = plan.stages[-1].iterations if begun and not last else 0
             solve = partial(
                 self.minimise,
                 options,
                 replace(stage, tolerance=max(stage.tolerance, least)),
                 place=(number, len(stages)),
                 reserved=reserved,
+                remaining=remaining if last else 0.0,
                 counts=counts,
             )
             coordinates, minimum = solve(coordinates)
@@ -240,6 +245,7 @@ class Run:
         items: Sequence[Weighted] | None = None,
         place: tuple[int, int] = (0, 1),
         reserved: int = 0,
+        remaining: float = 0.0,
         counts: Mapping[Kind, int] | None = None,
     ) -> tuple[Array, Minimum]:
         """Minimise the objective of one stage from coordinates.
@@ -258,6 +264,8 @@ class Run:
             Index and number of stages, for the callback.
         reserved : int
             Iterations of the budget to leave for later stages.
+        remaining : float
+            As for :func:`gso.solver.minimise`.
         counts : dict, optional
             As for :class:`gso.solver.problem.Problem`.
         """
@@ -283,6 +291,7 @@ class Run:
             x,
             iterations=most,
             tolerance=stage.tolerance,
+            remaining=remaining,
             continuation=stage.continuation if items is None else stage.continuation[-1:],
             continued=stage.continued,
             bounds=bounds,

@@ -11,6 +11,8 @@ from gso.typing import Array, N
 
 #: Required share of the linear decrease, and smallest step that is tried.
 DECREASE, SHORTEST = 1e-4, 1e-4
+#: Largest factor from one decrease of the energy to the next that is taken to last.
+SLOWEST = 0.9
 #: Energy (dimensionless) that counts as zero.
 _NOTHING = 1e-20
 
@@ -108,6 +110,18 @@ def ends_next(step: Any, enough: Any) -> Any:
         Whether the energy fell enough to go on.
     """
     return (step >= 1.0) | (step <= 0.0) | (enough ^ True)
+
+
+def foretold(before: float, now: float) -> float:
+    """Return the decrease of all further iterations, from those of the last two.
+
+    Decreases are taken to fall by the same factor from iteration to iteration.
+
+    >>> foretold(8.0, 2.0)  # 0.5 + 0.125 + ...
+    0.6666666666666666
+    """
+    factor = min(max(now / before if before > 0 else 1.0, 0.0), SLOWEST)
+    return max(now, 0.0) * factor / (1.0 - factor)
 
 
 def relative_decrease(

@@ -13,7 +13,7 @@ from gso import linalg
 from gso.energy.losses import Loss
 from gso.linalg.base import Solver
 from gso.solver.directions import METHODS, GaussNewton
-from gso.solver.line_search import armijo, ends_next, relative_decrease
+from gso.solver.line_search import armijo, ends_next, foretold, relative_decrease
 from gso.solver.problem import Problem
 from gso.status import Progress, Status
 from gso.typing import Array, Flags
@@ -66,6 +66,7 @@ def minimise(
     *,
     iterations: int,
     tolerance: float = 1e-4,
+    remaining: float = 0.0,
     continuation: Sequence[Loss] = (),
     continued: str = "",
     bounds: tuple[Array, Array] | None = None,
@@ -92,6 +93,9 @@ def minimise(
     tolerance : float
         Stop when an iteration with the last loss of `continuation` lowers the energy by less
         than this share of it; not the first such iteration after a shortened step.
+    remaining : float
+        Stop when all further iterations together would lower the energy by less than this share
+        of it, as the last two decreases foretell.
     continuation : sequence of Loss
         Losses by iteration of the terms named `continued`. The last one holds for all later
         iterations and for the energy returned.
@@ -149,7 +153,7 @@ def minimise(
     if not len(x):
         # Constraints fix every vertex: there are no unknowns.
         status, iterations = Status.CONVERGED, 0
-    done, ready = 0, True
+    done, ready, gained = 0, True, 0.0
     try:
         report(0, best_energy, 0.0)
         with linalg.blas_threads(threads):
@@ -182,6 +186,12 @@ def minimise(
                 if settled and end and ready:
                     status = end
                     break
+                fell = energy - value
+                least = remaining * abs(value)
+                if step >= 1.0 and gained > 0 and foretold(gained, fell) < least:
+                    status = Status.CONVERGED
+                    break
+                gained = fell if settled and step >= 1.0 else 0.0
                 ready = ends_next(step, end is None)
     except Cancelled:
         status = Status.CANCELLED

@@ -30,11 +30,22 @@ class Start:
     tolerance : float
         With `points`, stages stop when an iteration lowers the energy by less than this share
         of it, or than the options' tolerance where that is larger.
+    remaining : float
+        With or without `points`, the last stage stops when all further iterations together would
+        lower the energy by less than this share of it, as the last two decreases foretell. A
+        solve that converges slowly goes on for longer than with a `tolerance` alone.
+    resolution : int, optional
+        With `points` of a grid: vertices along the longer side of the grid for which they were
+        made. Finer grids start from the design, moved as the coarser ones were. By default
+        `points` have details of their own on every grid.
+    solved : bool
+        Whether `points` are the result of a solve at that resolution: no coarser grid is solved.
 
     Raises
     ------
     OptionError
-        `iterations` is not a whole number of 0 or more, or `tolerance` is negative or no number.
+        `iterations` or `resolution` is not a whole number of 0 or more, or `tolerance` or
+        `remaining` is negative or no number.
 
     Examples
     --------
@@ -52,14 +63,20 @@ class Start:
     guarded: bool = False
     iterations: int | None = None
     tolerance: float = 0.0
+    remaining: float = 0.0
+    resolution: int | None = None
+    solved: bool = False
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.tolerance, int | float | np.number) and self.tolerance >= 0):
-            raise OptionError(f"tolerance is {self.tolerance!r}; take a number, 0 or more")
-        most = self.iterations
-        if most is None:
-            return
-        if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 0:
-            raise OptionError(
-                f"iterations is {most!r}; take a whole number from 0 up, or None for no limit"
-            )
+        for name in ("tolerance", "remaining"):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float | np.number) and value >= 0):
+                raise OptionError(f"{name} is {value!r}; take a number, 0 or more")
+        for name in ("iterations", "resolution"):
+            most = getattr(self, name)
+            if most is None:
+                continue
+            if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 0:
+                raise OptionError(
+                    f"{name} is {most!r}; take a whole number from 0 up, or None for no limit"
+                )

@@ -46,4 +46,6 @@ TASK = NetTask(
     terms=("fair", "iso", "iso_w", "iso_cell", "iso_cell_w", "label"),
     energy=energy,
     displacement=0.03,
+    # The optimiser's own start is within a few iterations of the minimum.
+    warm_start=False,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from gso.tasks.developable.analysis import Analysis
 from gso.tasks.developable.bounds import inside
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
+from gso.tasks.start import Start
 from gso.typing import Array, Ints
 
 #: Vertices of a mesh to those of the next coarser one.
@@ -69,7 +70,9 @@ class Level:
         """Move its start by the displacement that the coarser level before it has found."""
         points = coordinates.reshape(-1, 3)
         if self.ids is None:
-            moved = prolong_displacement(before.begin, self.begin, points)
+            # A warm start has its details up to some resolution only.
+            base = before.mesh if self.begin is self.mesh else before.begin
+            moved = prolong_displacement(base, self.begin, points)
         else:
             c = self.constraints
             field = Prolongation(self.begin, self.ids, c.hard_ids)
@@ -87,8 +90,8 @@ def levels(analysis: Analysis, request: Request[Options]) -> list[Level]:
     """
     mesh, constraints = analysis.mesh, analysis.constraints
     start = request.x0
-    own = Level(mesh, mesh if start is None else mesh.replaced(start), constraints)
     begun = start is not None
+    own = Level(mesh, mesh if start is None else mesh.replaced(start), constraints)
     free = constraints.empty
     if begun and (request.max_displacement is not None or mesh.grid_index is None or not free):
         return [own]
@@ -97,7 +100,7 @@ def levels(analysis: Analysis, request: Request[Options]) -> list[Level]:
     if several(mesh) or request.options.variables == "spline":
         return [own]
     if mesh.grid_index is not None:
-        return _resample(own, request) if max(mesh.grid_shape or ()) > _SHORT else [own]
+        return _resample(own, request) if _side(mesh) > _SHORT else [own]
     least = request.options.coarse_vertices * (1 if free else _CONSTRAINED)
     return _thin(own) if len(mesh.vertices) > least else [own]
 
@@ -105,12 +108,10 @@ def levels(analysis: Analysis, request: Request[Options]) -> list[Level]:
 def _resample(own: Level, request: Request[Options]) -> list[Level]:
     """Return the levels of a grid."""
     o = request.options
-    # A warm start has the large displacements already, which the coarsest grids are for.
-    meshes = coarser(own.mesh, o.coarse_size if request.x0 is None else o.free_size)
-    # A warm start keeps its fine detail: only the displacements found on the coarser grids are
-    # interpolated and added to it. They correct its low-frequency error, which would take many
-    # iterations on the fine grid, at a fraction of the cost.
-    begins = meshes if request.x0 is None else resample_like(meshes, own.begin)
+    meshes = coarser(own.mesh, o.coarse_size if _from_the_coarsest(request) else o.free_size)
+    begins = meshes
+    if request.x0 is not None:
+        meshes, begins, own = _begun(own, meshes, request.start)
     found = []
     wanted = _vertices(own.constraints.parts)
     for mesh, begin in zip(meshes, begins, strict=True):
@@ -121,6 +122,43 @@ def _resample(own: Level, request: Request[Options]) -> list[Level]:
         if constraints is not None:
             found.append(Level(mesh, begin, constraints))
     return [*found, own]
+
+
+def _begun(own: Level, meshes: list[Mesh], start: Start) -> tuple[list[Mesh], list[Mesh], Level]:
+    """Return the coarser grids, the surfaces from which their stages start, and the own level.
+
+    A start keeps its fine detail: only the displacements found on the coarser grids are
+    interpolated and added to it. They correct its low-frequency error, which would take many
+    iterations on the fine grid, at a fraction of the cost.
+    """
+    if start.resolution is None:
+        return meshes, resample_like(meshes, own.begin), own
+    if start.solved:
+        meshes = [mesh for mesh in meshes if _side(mesh) > start.resolution]
+    begins = resample_like(meshes, own.begin)
+    keep = [detailed(mesh, start.resolution) for mesh in [*meshes, own.mesh]]
+    # The first one has the start's displacement, which the next ones get from it.
+    keep[0] = True
+    begins = [begin if k else mesh for mesh, begin, k in zip(meshes, begins, keep, strict=False)]
+    return meshes, begins, own if keep[-1] else replace(own, begin=own.mesh)
+
+
+def _from_the_coarsest(request: Request[Options]) -> bool:
+    """Tell whether the coarsest grids are needed.
+
+    A warm start that has details on all grids has the large displacements already.
+    """
+    return request.x0 is None or request.start.resolution is not None
+
+
+def detailed(mesh: Mesh, resolution: int) -> bool:
+    """Tell whether a start of some resolution has the details that a grid can show."""
+    return _side(mesh) < 2 * resolution
+
+
+def _side(mesh: Mesh) -> int:
+    """Return the number of vertices along the longer side of a grid."""
+    return max(mesh.grid_shape or (0,))
 
 
 def _thin(own: Level) -> list[Level]:

@@ -21,7 +21,7 @@ from gso.tasks.base import Plan, Stage
 from gso.tasks.developable import hidden_curvature, spline_stage
 from gso.tasks.developable.analysis import FLAT_CURVATURE, Analysis
 from gso.tasks.developable.bounds import check_handles, inside, offset_bounds, radius
-from gso.tasks.developable.levels import FREE_VERTICES, Level, levels, pinned_only
+from gso.tasks.developable.levels import FREE_VERTICES, Level, detailed, levels, pinned_only
 from gso.tasks.developable.objective import objective
 from gso.tasks.developable.options import Options
 from gso.tasks.request import Request
@@ -36,6 +36,12 @@ NOISE_REACH = 2.8
 
 #: Iterations with normal offsets between a warm start and the stage of free vertices.
 _OFFSETS_FIRST = 12
+#: Iterations on the coarsest grid and on the next ones up to `free_size` that correct a start
+#: of known resolution; more for finer designs, for which these grids cost little, and where less
+#: than this share of the energy may be left.
+_CORRECTIONS, _MORE_CORRECTIONS, _CLOSE = (4, 2), (8, 3), 1e-3
+#: Coarser grids that a start stands for that is solved already.
+_SOLVED = 3
 #: Factor on the iterations on the coarsest mesh where that is not a grid.
 _LONGER = 1.5
 #: Vertices above which the first iteration after a handle has moved changes offsets only.
@@ -176,7 +182,10 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
         )
 
     final = falling[-1:]
-    most = _iterations(o, coarser_meshes, request.x0 is not None)
+    known = request.start.resolution is not None
+    if request.x0 is not None and request.start.solved:
+        coarser_meshes += _SOLVED
+    most = _iterations(o, coarser_meshes, request.x0 is not None and not known)
     if request.max_displacement is not None:
         # Only offsets along normals have bounds. The second stage uses updated normals.
         return [stage("normal", o.iterations, losses) for losses in (falling, final)]
@@ -216,7 +225,7 @@ def _falling(options: Options) -> tuple[Absolute, ...]:
 def _iterations(options: Options, coarser_meshes: int, begun: bool) -> int:
     """Compute the iterations on a mesh that follows `coarser_meshes` coarser ones.
 
-    `begun` is whether there is a warm start, which has been solved on fewer coarser grids.
+    `begun` is whether there is a warm start of any resolution, which is far from the solution.
 
     From the fourth refinement on they are fewer, as coarser meshes have found nearly all of the
     displacement: two thirds as many of offsets, and half as many from mesh to mesh, but not fewer
@@ -239,8 +248,9 @@ def _coarse_stage(
     and of all if the last stage's are, unless there is a warm start, and under constraints that
     are not positions of vertices. With `max_displacement` all use normal offsets.
     """
-    o, mesh = request.options, level.mesh
-    first, begun = number == 0, request.x0 is not None
+    o, mesh, start = request.options, level.mesh, request.start
+    begun = request.x0 is not None
+    first = number == 0 and not (begun and start.solved)
     grid = mesh.grid_shape
     small = max(grid) <= o.free_size if grid else len(mesh.vertices) <= FREE_VERTICES
     iterations = o.coarse_iterations if first else o.between_iterations
@@ -250,9 +260,13 @@ def _coarse_stage(
         iterations = int(_LONGER * iterations)
     loose = small or o.variables == "free" or not pinned_only(level.constraints)
     kind = "free" if first or (not begun and loose) else "normal"
+    fall = not begun and (first or not grid)
+    if begun and small and start.resolution is not None:
+        fine = not detailed(analysis.mesh, start.resolution) or start.remaining < _CLOSE
+        iterations = (_MORE_CORRECTIONS if fine else _CORRECTIONS)[not first]
+        kind, fall = "free", first and fine
     if request.max_displacement is not None:
         kind = "normal"
-    fall = not begun and (first or not grid)
     return Stage(
         f"{grid[0]}x{grid[1]}" if grid else f"{len(mesh.faces):,} triangles",
         _layout(mesh),
