@@ -27,8 +27,10 @@ _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 @click.option("--out", metavar="RUN", required=True, type=click.Path(), help="Folder of the run.")
 @click.option("--minutes", metavar="M", type=float, help="Length of the run, instead of its steps.")
 @click.option("--steps", metavar="N", type=int, help="Steps of the run.")
+@click.option("--epochs", metavar="N", type=int, help="Passes over the surfaces, instead of steps.")
 @click.option("--seed", metavar="N", type=int, help="Seed of all random numbers.")
 @click.option("--fresh", metavar="N", type=int, help="Surfaces to draw beside those of the set.")
+@click.option("--sigma", metavar="S", type=float, help="denoise: the only noise to train for.")
 @click.option("--init", metavar="NET", help="Net to begin with.")
 @click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")
 @click.option("--teacher", metavar="NET", help="Net whose results are the labels.")
@@ -39,6 +41,7 @@ def train(
     data: str,
     out: str,
     minutes: float | None,
+    sigma: float | None,
     device: str | None,
     quiet: bool,
     **changes: Any,
@@ -55,7 +58,7 @@ def train(
     from gso.net.training.loop import MODEL
     from gso.net.training.loop import train as run
 
-    made = read(config, **changes)
+    made = read(config, **changes, sigma=None if sigma is None else [sigma, sigma])
     with closing(progress.Counts()) as bars, progress.share() as show:
         card = run(
             made,
