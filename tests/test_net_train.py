@@ -28,7 +28,16 @@ from tests.conftest import saddle, sphere_cap
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
-from gso.net import GSONet, load, make, save, train  # noqa: E402
+from gso.net import (  # noqa: E402
+    CHAINS,
+    GSONet,
+    available,
+    load,
+    make,
+    read_card,
+    save,
+    train,
+)
 from gso.net.models import Net, ball, normalise  # noqa: E402
 from gso.net.training import (  # noqa: E402
     Batch,
@@ -43,6 +52,7 @@ from gso.net.training import (  # noqa: E402
 from gso.net.training.data import Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.training.learning_rate import place  # noqa: E402
 from gso.net.training.muon import optimisers, orthogonal  # noqa: E402
+from gso.net.training.shipped_nets import HOURS  # noqa: E402
 from gso.net.training.training_run import begin  # noqa: E402
 
 CONFIGS = sorted(Path(gso.net.__file__).with_name("configs").glob("*.toml"))
@@ -650,3 +660,34 @@ def test_command(folder, tmp_path):
 
 def test_configuration_is_a_value():
     assert config() == config() and isinstance(config(), Config)
+
+
+@pytest.mark.slow
+def test_all_nets_are_trained_by_one_command(tmp_path):
+    """Every net of the package, from those trained before it; the same command resumes."""
+    recipe = gso.dataset.Recipe(n=12, size=16, extras=False)
+    gso.dataset.build(tmp_path / "set", recipe, workers=0)
+    words = ["train", "all", "--data", str(tmp_path / "set"), "--out", str(tmp_path / "runs")]
+    words += ["--device", "cpu", "--steps", "1", "--fresh", "0"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    assert set(HOURS) == {n for n in available() if n not in CHAINS}
+    cards = {n: read_card(tmp_path / "runs" / n / "model.safetensors") for n in HOURS}
+    assert all(card["steps"] == 1 and card["data"]["n"] == 12 for card in cards.values())
+    assert cards["net-f"]["begun_with"]["sha256"] == cards["net-c"]["sha256"]
+    for word, net in (("init", "net-c"), ("through", "net-c"), ("teacher", "developable")):
+        assert cards["net-f"]["config"][word] == str(tmp_path / "runs" / net / "model.safetensors")
+    (tmp_path / "runs" / "flatten-w" / "checkpoint.safetensors").unlink()
+    (tmp_path / "runs" / "flatten-w" / "model.safetensors").unlink()
+    assert CliRunner().invoke(main, words).exit_code == 0
+    for name, card in cards.items():
+        again = read_card(tmp_path / "runs" / name / "model.safetensors")
+        assert (again["sha256"], again["steps"]) == (card["sha256"], 1)
+    for wrong, says in (
+        (["--hours", "1"], "take one"),
+        (["--init", "net-c"], "--init does not go with all"),
+    ):
+        failed = CliRunner().invoke(main, [*words, *wrong])
+        assert failed.exit_code and says in failed.output
+    failed = CliRunner().invoke(main, [*words[:-4], "--hours", "net-d=1"])
+    assert failed.exit_code and "no net 'net-d'" in failed.output
