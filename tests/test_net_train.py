@@ -40,6 +40,7 @@ from gso.net import (  # noqa: E402
 )
 from gso.net.models import Net, ball, normalise  # noqa: E402
 from gso.net.training import (  # noqa: E402
+    HOURS,
     Batch,
     Config,
     Objective,
@@ -52,7 +53,6 @@ from gso.net.training import (  # noqa: E402
 from gso.net.training.data import Source, fresh, noisy, open_source  # noqa: E402
 from gso.net.training.learning_rate import place  # noqa: E402
 from gso.net.training.muon import optimisers, orthogonal  # noqa: E402
-from gso.net.training.shipped_nets import HOURS  # noqa: E402
 from gso.net.training.training_run import begin  # noqa: E402
 
 CONFIGS = sorted(Path(gso.net.__file__).with_name("configs").glob("*.toml"))
