@@ -12,10 +12,10 @@ import click
 from gso.cli import progress
 from gso.cli import shared_options as shared
 from gso.errors import OptionError
-from gso.typing import Json
 
 if TYPE_CHECKING:
     from gso.net.training.loop import Report
+    from gso.typing import Json
 
 #: Metrics that are shown beside the progress bar, if the task has them.
 _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
