@@ -25,9 +25,14 @@ from gso.verdict import Code
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Files with tables.
-PAGES = tuple(ROOT / "docs" / f"{name}.rst" for name in ("reference", "benchmarks", "net"))
+PAGES = (
+    ROOT / "README.rst",
+    *(ROOT / "docs" / f"{name}.rst" for name in ("reference", "benchmarks", "net")),
+)
 #: What was measured; without it there are no tables of it.
 RESULTS = ROOT / "bench" / "data" / "results.json"
+#: The figures of the README, of ``python bench/run_all.py --only tno.developable --json FILE``.
+PRESETS = ROOT / "bench" / "data" / "presets.json"
 
 
 def tables() -> dict[str, str]:
@@ -48,6 +53,8 @@ def tables() -> dict[str, str]:
         found[f"splits-{task}"] = split_table(task, metric)
     if RESULTS.exists():
         found |= measured(json.loads(RESULTS.read_text(encoding="utf-8")))
+    if PRESETS.exists():
+        found["measured-presets"] = preset_table(json.loads(PRESETS.read_text(encoding="utf-8")))
     return found
 
 
@@ -124,7 +131,9 @@ def measured(results: dict[str, Any]) -> dict[str, str]:
         if not name.startswith("denoise")
     }
     levels = {k: v for k, v in sections.items() if k.startswith("denoise")}
-    found["measured-denoise"] = denoise_table(levels)
+    found["measured-denoise"] = denoise_table(levels, "theta")
+    found["measured-denoise-rate"] = denoise_table(levels, "rate")
+    found["measured-pairs"] = pair_table(results.get("pairs", ()))
     found["measured-size"] = size_table(results["timing"])
     found["measured-losses"] = "\n".join(
         line
@@ -166,20 +175,68 @@ def quality_table(section: dict[str, Any]) -> str:
     return csv_table(head, rows, (24, *[10] * (len(head) - 1)))
 
 
-def denoise_table(levels: dict[str, dict[str, Any]]) -> str:
-    """Angle of the normals at every level of the noise, and the time at the first."""
+def denoise_table(levels: dict[str, dict[str, Any]], metric: str) -> str:
+    """A metric at every level of the noise, and the time at the first.
+
+    For the angle of the normals, "theta", the first rows are those of the surfaces with noise.
+    """
     angles: dict[str, list[str]] = {}
     times: dict[str, tuple[str, str]] = {}
     for section in levels.values():
+        given = {row["source"]: row for row in reversed(section["rows"]) if not row["absent"]}
+        for source in ("paper", "package") if metric == "theta" else ():
+            name = row_name(given[source] | {"name": "with noise"})
+            angles.setdefault(name, []).append(number(given[source]["figures"]["theta_noisy"]))
+            count = given[source]["count"]
+            times[name] = ("", f"{count:,}" if count else "")
         for row in section["rows"]:
             if not row["absent"]:
-                angles.setdefault(row_name(row), []).append(number(row["figures"]["theta"]))
+                angles.setdefault(row_name(row), []).append(number(row["figures"][metric]))
                 count = f"{row['count']:,}" if row["count"] else ""
                 times.setdefault(row_name(row), (duration(row["seconds"].get("median")), count))
     whole = {name: found for name, found in angles.items() if len(found) == len(levels)}
     head = ("Method", *(f"σ {name.split('-')[1]}" for name in levels), "Time", "Surfaces")
     rows = [(name, *found, *times[name]) for name, found in whole.items()]
     return csv_table(head, rows, (28, *[12] * (len(head) - 1)))
+
+
+def pair_table(pairs: Iterable[dict[str, Any]]) -> str:
+    """Published rows beside the rows of their names, and hybrid beside the cold solve."""
+    headings = {"seconds": "time, s", "theta": "theta", "rate": "rate, %"}
+    rows = [
+        (
+            p["section"],
+            f"*{p['other']}, published*" if p["published"] else p["other"],
+            p["own"],
+            headings.get(p["metric"], f"``{p['metric']}``"),
+            number(p["theirs"]),
+            number(p["ours"]),
+            "" if p["low"] is None else f"{number(p['low'])} to {number(p['high'])}",
+            {"ours": p["own"], "theirs": "published" if p["published"] else p["other"]}.get(
+                p["better"], "neither"
+            ),
+        )
+        for p in pairs
+    ]
+    head = ("Table", "Row", "Beside", "Figure", "Row's", "Beside's", "Interval", "Better")
+    return csv_table(head, rows, (14, 20, 14, 16, 10, 10, 18, 14))
+
+
+def preset_table(found: dict[str, Any]) -> str:
+    """The README's figures of the presets on the 24 reference surfaces."""
+    rows = [
+        (
+            name,
+            *(f"{row[c]:.2f}" for c in ("strain %", "90th")),
+            *(f"{row[c]:.4f}" for c in ("worse", "every 2nd")),
+            *(f"{row[c]:.3f}" for c in ("K_A-r worse", "d_H %", "fairness")),
+        )
+        for name, row in found["tno.developable"].items()
+        if "SciPy" not in name
+    ]
+    head = ("Preset", "largest strain %", "90th percentile", "worse split", "every 2nd vertex")
+    head += ("removed", "d_H %", "fairness")
+    return csv_table(head, rows, (14, 14, 14, 12, 14, 12, 10, 10))
 
 
 def size_table(timing: list[dict[str, Any]]) -> str:

@@ -54,7 +54,9 @@ def screened_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "gso.dataset.builder.select",
-            lambda count, hard, *, seed, tick=None: known(count, hard, seed=seed),
+            lambda count, hard, *, seed, strata, tick=None: known(
+                count, hard, seed=seed, strata=strata
+            ),
         )
         yield
 
@@ -100,6 +102,25 @@ class TestScreen:
             beyond = sum(edge >= values.max() for edge in edges)
             assert min(counts[: len(counts) - beyond + 1]) > 0, name
 
+    def test_all_features_of_the_paper_get_their_shares(self):
+        count = 100
+        chosen = screen.select(count, 0, seed=5, strata="features")
+        found = self.features(5, chosen.main)
+        values = np.column_stack([found["K_A"], found["sigma2"], found["K_P"] / found["K_A"]])
+        edges = [screen.CURVATURE, screen.SHAPE, screen.BALANCE]
+        there = np.histogramdd(values, edges)[0]
+        np.testing.assert_array_equal(there.ravel(), screen.quotas(count, "features"))
+        # Flat to strongly curved surfaces of either sign, and mixed ones, in every split.
+        for part in np.split(values, [50]):
+            counts = np.histogram(part[:, 2], screen.BALANCE)[0] / len(part)
+            np.testing.assert_allclose(counts, screen.BALANCE_SHARES, atol=0.05)
+            assert part[:, 0].mean() == pytest.approx(0.307, abs=0.03)
+        np.testing.assert_allclose(found["K_A"], found["K_P"] - found["K_N"], rtol=1e-9)
+
+    def test_the_older_strata_leave_the_manifest_as_it_was(self):
+        assert "strata" not in Recipe().as_dict()
+        assert Recipe(strata="features").as_dict()["strata"] == "features"
+
     def test_every_split_has_its_share_of_each_interval(self):
         chosen = screen.select(400, 0, seed=5)
         for part in np.split(self.features(5, chosen.main)["K_A"], [320, 360]):
@@ -125,9 +146,10 @@ class TestScreen:
     def test_quotas_sum_to_what_is_asked_for(self):
         for count in (10, 63, 64, 1000, Recipe().n):
             assert screen.quotas(count).sum() == count
+            assert screen.quotas(count, "features").sum() == count
         assert screen.quotas(Recipe().n).min() > 20
-        shares = np.array(screen.CURVATURE_SHARES), np.array(screen.SHAPE_SHARES)
-        assert [s.sum() for s in shares] == pytest.approx([1.0, 1.0])
+        shares = screen.CURVATURE_SHARES, screen.SHAPE_SHARES, screen.BALANCE_SHARES
+        assert [sum(s) for s in shares] == pytest.approx([1.0, 1.0, 1.0])
 
     def test_another_seed_gives_other_surfaces(self):
         one, other = (screen.select(10, 1, seed=s) for s in (1, 2))
@@ -780,7 +802,8 @@ class TestSummary:
         if not path.exists():
             pytest.skip("the manifest of the large set is not there")
         record = json.loads(path.read_text())
-        recipe = Recipe(**{f.name: record["recipe"][f.name] for f in fields(Recipe)})
+        named = [f.name for f in fields(Recipe) if f.name in record["recipe"]]
+        recipe = Recipe(**{name: record["recipe"][name] for name in named})
         assert record["splits"] == recipe.splits == Recipe().splits
         main_splits = [record["summary"][name] for name in ("train", "validation", "test")]
         total = sum(s["count"] * s["features"]["K_A"]["mean"] for s in main_splits)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -435,6 +436,89 @@ class TestFiles:
             card["model"] = model
         path.write_bytes(data)
         path.with_suffix(".json").write_text(json.dumps(card))
+
+
+class TestImport:
+    """Weights of another implementation, under other names."""
+
+    def theirs(self, task="developable", **settings):
+        net = GSONet(task, **settings)
+        torch.nn.init.normal_(net.tail.weight, std=0.01)
+        tensors = net.state_dict().values()
+        return net, {f"model.{k}.weight": v.clone() for k, v in enumerate(tensors)}
+
+    @pytest.mark.parametrize(("task", "count"), [("developable", 2820832), ("flatten", 2820688)])
+    @pytest.mark.parametrize("how", ["plain", "checkpoint", "safetensors"])
+    def test_the_same_net(self, task, count, how, tmp_path):
+        net, state = self.theirs(task)
+        source = tmp_path / ("net.safetensors" if how == "safetensors" else "net.pth")
+        if how == "safetensors":
+            from safetensors.torch import save_file
+
+            save_file(state, source)
+        else:
+            torch.save({"epoch": 3, "state_dict": state} if how == "checkpoint" else state, source)
+        card = gso.net.import_weights(source, tmp_path / "own.safetensors", task=task)
+        assert card["parameters"] == count
+        assert card["imported"]["file"] == source.name
+        loaded = load(tmp_path / "own.safetensors").state_dict()
+        assert all(torch.equal(v, loaded[k]) for k, v in net.state_dict().items())
+
+    @pytest.mark.parametrize(
+        ("change", "says"),
+        [
+            (lambda s: s.pop("model.7.weight"), "tensor 8, 'model.8.weight'"),
+            (lambda s: s.update({"more": torch.zeros(3)}), "nothing in the net fits 'more'"),
+            (lambda s: s.pop([*s][-1]), "nothing for 'tail.weight'"),
+            (lambda s: s["model.3.weight"].fill_(float("nan")), "'model.3.weight'"),
+            (lambda s: s.update(model=torch.nn.Linear(2, 2)), "tensors only"),
+            (lambda s: s.clear(), "0 dictionaries"),
+        ],
+    )
+    def test_what_does_not_fit_is_named(self, change, says, tmp_path):
+        _, state = self.theirs(channels=4, blocks=1)
+        change(state)
+        torch.save(state, tmp_path / "net.pth")
+        with pytest.raises(WeightsError, match=says):
+            gso.net.import_weights(
+                tmp_path / "net.pth", tmp_path / "a.safetensors", channels=4, blocks=1
+            )
+        assert not (tmp_path / "a.safetensors").exists()
+
+    def test_another_task_and_no_file(self, tmp_path):
+        _, state = self.theirs("flatten", channels=4, blocks=1)
+        torch.save(state, tmp_path / "net.pth")
+        size = {"channels": 4, "blocks": 1}
+        with pytest.raises(WeightsError, match=r"'tail\.weight', 3 x 4 x 3 x 3"):
+            gso.net.import_weights(tmp_path / "net.pth", tmp_path / "a.safetensors", **size)
+        (tmp_path / "text.pth").write_text("no weights")
+        for name in ("none.pth", "text.pth"):
+            with pytest.raises(WeightsError, match=name):
+                gso.net.import_weights(tmp_path / name, tmp_path / "a.safetensors", **size)
+
+
+@pytest.mark.parametrize("name", [n for n in available() if n not in CHAINS])
+def test_cards_say_how_nets_were_trained(name):
+    from gso.net.training import from_dict
+
+    card = read_card(located(name))
+    made = from_dict(card["config"])
+    assert (made.name, made.task) == (name, card["model"]["task"]) == (card["name"], made.task)
+    # Settings that were added later, or changed after the run, may differ.
+    assert made.model["kind"] == card["model"]["kind"]
+    assert (
+        1 <= card["data"]["version"] <= gso.dataset.Recipe().as_dict()["version"]
+        and card["data"]["n"] > 0
+    )
+    assert card["test"]["surfaces"] == 1041
+    chain = [card]
+    while "begun_with" in chain[-1]:
+        chain.append(chain[-1]["begun_with"])
+    for run in chain:
+        assert run["hours"] > 0 and len(run["sha256"]) == 64 and run["hardware"]["device"]
+        assert run["name"] in available()
+    # Hours of a run contain those of the runs before it under the same name.
+    assert all(a["hours"] > b["hours"] for a, b in pairwise(chain) if a["name"] == b["name"])
 
 
 @pytest.mark.parametrize("name", [n for n in available() if n not in CHAINS])

@@ -99,6 +99,8 @@ def test_losses_are_the_metrics(pair):
         assert float(left[k]) == pytest.approx(is_left / was, rel=1e-12)
         assert float(near[k]) == pytest.approx(metrics.d_H(design, result), rel=1e-12)
         assert float(gc[k]) == pytest.approx(is_left, rel=1e-12)
+        one = training_losses.loss_gc(batch(result))
+        assert float(one) == pytest.approx(metrics.loss_gc(result, scale=1.0), rel=1e-12)
         assert float(fair[k]) == pytest.approx(metrics.fairness(result, scale=1.0), rel=1e-6)
         grew = metrics.fairness_ratio(design, result)
         assert float(ratio[k]) == pytest.approx(grew, rel=1e-6)

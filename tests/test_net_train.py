@@ -28,9 +28,19 @@ from tests.conftest import saddle, sphere_cap
 torch = pytest.importorskip("torch")
 pytest.importorskip("safetensors")
 
-from gso.net import GSONet, load, make, save, train  # noqa: E402
+from gso.net import (  # noqa: E402
+    CHAINS,
+    GSONet,
+    available,
+    load,
+    make,
+    read_card,
+    save,
+    train,
+)
 from gso.net.models import Net, ball, normalise  # noqa: E402
 from gso.net.training import (  # noqa: E402
+    HOURS,
     Batch,
     Config,
     Objective,
@@ -101,9 +111,51 @@ def test_shipped_configurations(path):
     assert sum(p.numel() for p in net.parameters()) < 3e6
 
 
+#: Net, epochs, learning rate, decay of the weight of "in", and weights of the published recipes.
+PAPER = {
+    "pretrain": (1000, 1e-3, 0.0, {"in": 1.0, "fair": 1.0}),
+    "net-s": (4000, 1e-4, 4.0, {"in": 1.0, "fair": 1.0, "loss_gc": 1.0}),
+    "net-c": (4000, 1e-4, 3.0, {"in": 1.0, "fair": 1.0, "loss_gc": 1.0}),
+    "net-f": (4000, 1e-4, 3.0, {"in": 1.0, "fair": 1.0, "loss_gc": 1.0}),
+    "flatten": (1000, 1e-4, 0.0, {"iso": 1e6, "fair": 1.0}),
+    "flatten-w": (1000, 1e-4, 0.0, {"iso_w": 1e6, "fair": 1.0}),
+    "denoise": (1000, 1e-4, 0.0, {"in": 1.0, "fair": 10.0}),
+}
+
+
+def test_recipes_of_the_paper_are_the_published_ones():
+    assert {p.stem for p in CONFIGS if "paper" in p.stem} == {f"paper-{name}" for name in PAPER}
+    for name, (epochs, rate, decay, weights) in PAPER.items():
+        made = read(f"paper-{name}")
+        (phase,) = made.phases
+        assert (made.epochs, phase.decay, phase.weights) == (epochs, decay, weights)
+        assert (phase.batch, phase.clip, made.optimiser) == (256, 0.01, "adamw")
+        assert {place(made.phases, t, made.warm_up).rate for t in (0.0, 0.3, 1.0)} == {rate}
+        assert (made.ema, made.augment, made.init) == (0.0, "shear", "")
+        with torch.device("meta"):
+            net = make({**made.model, "task": made.task})
+        assert sum(p.numel() for p in net.parameters()) == 2820832 - 144 * net.kind.flat
+
+
+def test_a_run_may_be_so_many_passes_long(folder, tmp_path):
+    phase = [{"weights": {"loss_gc": 1.0, "in": 1.0}, "batch": 3, "rate": 1e-3, "final_rate": 1e-3}]
+    made = config(phase=phase, epochs=2, warm_up=0.0, ema=0.0)
+    # Eight surfaces, twice, in batches of three.
+    assert train(made, folder, tmp_path / "a", device="cpu")["steps"] == 6 == made.steps_for(8)
+    assert train(replace(made, limit=4), folder, tmp_path / "b", device="cpu")["steps"] == 3
+    assert read("paper-net-s", steps=5).steps_for(8320) == 5
+    with pytest.raises(OptionError, match="take one"):
+        read("paper-net-s", steps=5, epochs=3)
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
+        ({"warm_up": 2.0}, "warm_up is 2"),
+        (
+            {"epochs": 2, "phase": [{"loss": "energy"}, {"loss": "energy", "batch": 3}]},
+            "other batches",
+        ),
         ({"task": "bend"}, "task is 'bend'"),
         ({"colour": 3}, "Config takes no 'colour'"),
         ({"optimiser": "sgd"}, "optimiser is 'sgd'"),
@@ -608,3 +660,34 @@ def test_command(folder, tmp_path):
 
 def test_configuration_is_a_value():
     assert config() == config() and isinstance(config(), Config)
+
+
+@pytest.mark.slow
+def test_all_nets_are_trained_by_one_command(tmp_path):
+    """Every net of the package, from those trained before it; the same command resumes."""
+    recipe = gso.dataset.Recipe(n=12, size=16, extras=False)
+    gso.dataset.build(tmp_path / "set", recipe, workers=0)
+    words = ["train", "all", "--data", str(tmp_path / "set"), "--out", str(tmp_path / "runs")]
+    words += ["--device", "cpu", "--steps", "1", "--fresh", "0"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    assert set(HOURS) == {n for n in available() if n not in CHAINS}
+    cards = {n: read_card(tmp_path / "runs" / n / "model.safetensors") for n in HOURS}
+    assert all(card["steps"] == 1 and card["data"]["n"] == 12 for card in cards.values())
+    assert cards["net-f"]["begun_with"]["sha256"] == cards["net-c"]["sha256"]
+    for word, net in (("init", "net-c"), ("through", "net-c"), ("teacher", "developable")):
+        assert cards["net-f"]["config"][word] == str(tmp_path / "runs" / net / "model.safetensors")
+    (tmp_path / "runs" / "flatten-w" / "checkpoint.safetensors").unlink()
+    (tmp_path / "runs" / "flatten-w" / "model.safetensors").unlink()
+    assert CliRunner().invoke(main, words).exit_code == 0
+    for name, card in cards.items():
+        again = read_card(tmp_path / "runs" / name / "model.safetensors")
+        assert (again["sha256"], again["steps"]) == (card["sha256"], 1)
+    for wrong, says in (
+        (["--hours", "1"], "take one"),
+        (["--init", "net-c"], "--init does not go with all"),
+    ):
+        failed = CliRunner().invoke(main, [*words, *wrong])
+        assert failed.exit_code and says in failed.output
+    failed = CliRunner().invoke(main, [*words[:-4], "--hours", "net-d=1"])
+    assert failed.exit_code and "no net 'net-d'" in failed.output

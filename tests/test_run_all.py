@@ -39,6 +39,8 @@ from report import (  # noqa: E402
 )
 from report.method import TASKS, Method, Solved, tuned  # noqa: E402
 from report.methods import methods, of  # noqa: E402
+from report.peers_bilateral import bilateral  # noqa: E402
+from report.peers_thinning import thinned  # noqa: E402
 from report.published import NETS, TABLE_1, TABLE_2, TABLE_3  # noqa: E402
 from report.sections import SECTIONS, Row, Section, rows  # noqa: E402
 from report.settings import Settings  # noqa: E402
@@ -325,7 +327,7 @@ def test_surfaces_of_a_set_that_is_built(tmp_path):
     np.testing.assert_allclose(some.case(0, 0.01).given, split["noisy_0.010"][0], atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["store", "method", "timing", "pages"])
+@pytest.mark.parametrize("name", ["store", "method", "timing", "pages", "spread"])
 def test_examples_in_the_docstrings(name):
     module = importlib.import_module(f"report.{name}")
     tried = doctest.testmod(module)
@@ -389,6 +391,34 @@ def test_peers_have_tuned_parameters_for_every_level():
 
 
 # ---------------------------------------------------------------- peers
+
+
+def test_bilateral_filter_of_normals_keeps_planes_and_folds(tmp_path):
+    """Zheng et al. 2011: noise goes, and a fold of 90 degrees stays sharp."""
+    u, v = np.mgrid[:20.0, :21.0] / 20
+    roof = np.stack([u, v, np.abs(v - 0.5)], axis=-1)
+    settings = {"steepness": 0.4, "passes": 10, "updates": 20}
+    calm = bilateral(quality.Case(roof, roof), **settings).points
+    np.testing.assert_allclose(calm, roof, atol=1e-3)
+    noise = np.random.default_rng(0).normal(scale=0.002, size=roof.shape)
+    case = quality.Case(roof, roof + noise, 0.002)
+    found = quality.figures("denoise", case, bilateral(case, **settings).points)
+    assert found["theta"] < 0.35 * found["theta_noisy"]
+
+
+def test_thinning_leaves_cylinders_and_unbends_saddles():
+    """Binninger et al. 2021: the Gauss image of a cylinder is a curve already."""
+    u, v = np.mgrid[-0.5:0.5:24j, -0.5:0.5:24j]
+    cylinder = np.stack([np.sin(u), v, np.cos(u)], axis=-1)
+    saddle = np.stack([u, v, 0.5 * u * v], axis=-1)
+    settings = {"rings": 2, "iterations": 30, "closeness": 1e-4}
+    for points, most in ((cylinder, 0.05), (saddle, 0.6)):
+        case = quality.Case(points, points)
+        figures = quality.figures("developable", case, thinned(case, **settings).points)
+        if points is saddle:
+            assert figures["loss_gc_worst"] < most * gso.metrics.loss_gc_worst(saddle)
+        else:
+            assert figures["d_H"] < most
 
 
 def test_other_solvers_get_the_same_objective(surfaces):
@@ -462,6 +492,56 @@ def test_nothing_is_lost_to_what_is_worse_or_failed(monkeypatch):
     assert not made_up(monkeypatch, fine, fine, fine)
 
 
+def test_means_have_intervals_and_times_have_runs(monkeypatch):
+    rng = np.random.default_rng(1)
+    values = rng.normal(1.0, 0.2, 400)
+    default = [record(strain_mean=x) | {"again": [2.0, 3.0]} for x in values]
+    # Better by a little, but on every surface: the interval of the difference is narrow.
+    own = [record(strain_mean=x - 0.01) for x in values]
+    peer = [record(0.1, strain_mean=x - 0.3) for x in values]
+    (loss, *_) = made_up(monkeypatch, default, own, peer)
+    winner = next(w for w in loss.winners if w.name == "peer")
+    for mean, (low, high) in ((0.7, winner.spread), (1.0, winner.our_spread)):
+        # The standard error of the mean is 0.01.
+        assert low < mean < high and high - low == pytest.approx(4 * 0.01, rel=0.2)
+    assert f"[{winner.spread[0]:.3g}, {winner.spread[1]:.3g}]" in str(winner)
+    (section,) = verdict.SECTIONS
+    given = {"default": default, "own": own, "peer": peer}
+    found = {r.name: r for r in rows(section, {("flatten", 0.0, k): v for k, v in given.items()})}
+    assert found["default"].spread["seconds"] == (1.0, 3.0)
+    assert "seconds" not in found["own"].spread
+    low, high = found["own"].from_default["strain_mean"]
+    assert low == pytest.approx(-0.01) and high == pytest.approx(-0.01)
+    assert not found["default"].from_default and not found["peer"].from_default
+
+
+def test_published_rows_stand_beside_the_rows_of_their_names():
+    def row(name, source, **more):
+        found = {"loss_gc": 0.5, "d_H": 1.0}
+        return asdict(Row(name, source, figures=found, seconds={"median": 1.0})) | more
+
+    given = [
+        row("TNO", "paper"),
+        row("Net-S", "paper"),
+        row("TNO jiang2020", "package", spread={"loss_gc": (0.3, 0.6), "d_H": (1.1, 1.2)}),
+        row("TNO balanced", "package"),
+        row("hybrid", "package", from_default={"loss_gc": (-0.2, -0.1)}),
+    ]
+    given[2]["figures"] = {"loss_gc": 0.4, "d_H": 1.15}
+    given[4]["figures"] = {"loss_gc": 0.35, "d_H": 1.0001}
+    found = verdict.pairs({"developable": {"columns": ["loss_gc", "d_H"], "rows": given}})
+    better = {(p["own"], p["metric"]): p["better"] for p in found}
+    assert better == {
+        ("TNO jiang2020", "loss_gc"): "",
+        ("TNO jiang2020", "d_H"): "theirs",
+        ("TNO jiang2020", "seconds"): "",
+        ("hybrid", "loss_gc"): "ours",
+        ("hybrid", "d_H"): "",
+        ("hybrid", "seconds"): "",
+    }
+    assert {p["other"] for p in found if p["own"] == "hybrid"} == {"TNO balanced"}
+
+
 @pytest.mark.parametrize("task", TASKS)
 def test_shares_and_limit_of_a_solve(task):
     found = measure.main(task, "TNO", "", 16, 2, 5.0)
@@ -484,7 +564,10 @@ def test_tables_of_docs_come_from_the_figures(tiny, monkeypatch, tmp_path):
     result = {k: v for k, v in tiny[2].items() if k != "records"}
     found = tables.measured(result)
     names = {f"measured-{n}" for n in ("machine", "developable", "energy", "flatten", "denoise")}
-    assert names | {"measured-size", "measured-losses"} == set(found)
+    names |= {f"measured-{n}" for n in ("denoise-rate", "pairs", "losses", "size")}
+    assert names == set(found)
+    assert found["measured-denoise"].count("with noise") == 2
+    assert '"*Net-S, published*",Net-S,``K_A_r``' in found["measured-pairs"]
     balanced = next(
         r for r in result["sections"]["developable"]["rows"] if r["name"] == "TNO balanced"
     )

@@ -21,7 +21,7 @@ from report.settings import Settings
 from report.store import Store
 from report.surfaces import Surfaces
 from report.timing import Timing, pieces, timings
-from report.verdict import losses, unmeasured
+from report.verdict import losses, pairs, unmeasured
 
 #: Surfaces of each method whose figures a test compares.
 COMPARED = 2
@@ -73,16 +73,18 @@ def run(settings: Settings, surfaces: Surfaces, out: Path, command: str) -> dict
 def _figures(records: Records, times: list[Timing]) -> dict[str, Any]:
     """Return what was measured, for ``results.json``."""
     found = losses(records)
+    sections = {
+        section.name: {
+            "title": section.title,
+            "columns": list(section.columns),
+            "headings": [HEADINGS[column] for column in section.columns],
+            "rows": [asdict(row) for row in rows(section, records)],
+        }
+        for section in SECTIONS
+    }
     return {
-        "sections": {
-            section.name: {
-                "title": section.title,
-                "columns": list(section.columns),
-                "headings": [HEADINGS[column] for column in section.columns],
-                "rows": [asdict(row) for row in rows(section, records)],
-            }
-            for section in SECTIONS
-        },
+        "sections": sections,
+        "pairs": pairs(sections),
         "figure_6": figures.curves(records),
         "timing": [asdict(t) for t in times],
         "exponents": pages.exponents(times),

@@ -13,7 +13,13 @@ from gso.parametrization import rectangle
 from report.method import TASKS, Method, Solved
 from report.surfaces import Case
 
-_PEERS = ("peers_flatten", "peers_developable", "peers_denoise")
+_PEERS = (
+    "peers_flatten",
+    "peers_developable",
+    "peers_thinning",
+    "peers_denoise",
+    "peers_bilateral",
+)
 #: Tasks that the optimiser solves with kernels; denoising is in closed form.
 KERNELS = ("developable", "flatten")
 #: The method of each task that the others are compared with.

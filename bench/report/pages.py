@@ -12,6 +12,7 @@ from typing import Any
 from report import kernels
 from report.figures import Figures
 from report.published import INPUT
+from report.sections import HEADINGS
 from report.timing import PHASES, Timing, exponent
 from report.verdict import against_limit
 
@@ -73,6 +74,19 @@ def _quality(row: Mapping[str, Any], columns: Cells, both: bool) -> Cells:
     return [_SOURCES[row["source"]], row["name"], *figures, *times, *last]
 
 
+def pair_table(pairs: Iterable[Mapping[str, Any]]) -> str:
+    """Return a table of published rows and the package's rows of their names."""
+    rows = []
+    for p in pairs:
+        metric = HEADINGS.get(p["metric"], "time, s")
+        within = "" if p["low"] is None else f"{number(p['low'])} to {number(p['high'])}"
+        other = f"{p['other']}, published" if p["published"] else p["other"]
+        figures = [number(p["theirs"]), number(p["ours"]), within]
+        rows.append([p["section"], metric, other, p["own"], *figures, p["better"]])
+    head = ["table", "figure", "theirs", "ours", "theirs", "ours", "interval", "better"]
+    return table(head, rows)
+
+
 def timing_table(timings: Iterable[Timing]) -> str:
     """Return a table of time against size."""
     head = ["task", "method", "grid", "median", "fastest", "slowest", "solves", "iterations"]
@@ -106,6 +120,7 @@ def markdown(
     context = {"result": result, "times": times, "figures": figures}
     context |= {"folder": folder, "packages": packages, "input": INPUT, "kernels": kernels}
     context |= {"quality_table": quality_table, "timing_table": timing_table}
+    context |= {"pair_table": pair_table}
     text = _template("page.md", context | {"limits": against_limit(times)})
     blocks = re.split(r"\n\s*\n", text.strip())
     # A paragraph has one line; lists and tables have one for each item.

@@ -18,14 +18,14 @@ from gso.linalg import blas_threads
 from gso.mesh import Mesh
 from gso.typing import Array
 from report import kernels, store
-from report.method import TASKS, Method, level_name
+from report.method import TASKS, Method, Solved, level_name
 from report.methods import methods, of
 from report.settings import Settings
 from report.store import Store
 from report.surfaces import Case, Surfaces
 
-#: The record of a method on a surface: figures, seconds, iterations, or an error; seconds with
-#: NumPy kernels, too, where they were measured.
+#: The record of a method on a surface: figures, seconds, iterations, or an error; seconds of
+#: further runs as "again", and with NumPy kernels, where they were measured.
 Record = dict[str, Any]
 #: Records in the order of the surfaces, by task, level of the noise, and method.
 Records = dict[tuple[str, float, str], list[Record]]
@@ -38,7 +38,10 @@ _BLOCKS, _UNTIMED = {"fast": 16, "slow": 4, "peer": 2}, 64
 
 @dataclass(frozen=True)
 class Block:
-    """Some surfaces for one method; `numpy` says that they are solved with NumPy kernels."""
+    """Some surfaces for one method; `numpy` says that they are solved with NumPy kernels.
+
+    They are timed in so many runs, one after the other.
+    """
 
     task: str
     name: str
@@ -48,6 +51,7 @@ class Block:
     stop: int
     timed: bool
     numpy: bool = False
+    runs: int = 1
 
     @property
     def method(self) -> Method:
@@ -72,7 +76,7 @@ class Block:
         known = self.method.key(self.sigma) | {"surfaces": self.surfaces.key}
         if self.method.kernels:
             known["kernels"] = kernels.key(self.choice)
-        return known | {"processor": store.processor() if self.timed else ""}
+        return known | {"processor": store.processor() if self.timed else "", "runs": self.runs}
 
 
 def levels(task: str) -> tuple[float, ...]:
@@ -91,8 +95,9 @@ def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
         again = min(settings.numpy.get(method.pace, 0) if both else 0, timed)
         for sigma in levels(method.task):
             whole = partial(Block, method.task, method.name, sigma, surfaces)
+            runs = settings.runs if method.pace == "fast" else 1
             for begin, end, step, kind in (
-                (0, timed, size, (True,)),
+                (0, timed, size, (True, False, runs)),
                 (0, again, size, (True, True)),
                 (timed, count, _UNTIMED, (False,)),
             ):
@@ -151,6 +156,10 @@ def measure(block: Block) -> list[Record]:
             _prepare(method, cases(block.start), block.numpy)
             _warm.add((block.task, block.name, block.numpy))
         found = [_record(method, cases(k)) for k in range(block.start, block.stop)]
+        for _ in range(block.runs - 1):
+            for k, record in enumerate(found, block.start):
+                if "error" not in record:
+                    record["again"] = [*record.get("again", ()), _solved(method, cases(k))[1]]
     return found if block.timed else [record | {"seconds": None} for record in found]
 
 
@@ -164,14 +173,10 @@ def _prepare(method: Method, case: Case, numpy: bool) -> None:
 
 
 def _record(method: Method, case: Case) -> Record:
-    if method.peer:
-        case.mesh  # noqa: B018 - before the clock starts
-    clock = time.perf_counter()
     try:
-        solved = quietly(method, case)
+        solved, seconds = _solved(method, case)
     except Exception as error:  # a peer may raise anything; the others still run
         return {"error": f"{type(error).__name__}: {error}"}
-    seconds = time.perf_counter() - clock
     if not np.isfinite(solved.points).all():
         return {"error": "the result is not finite"}
     return {
@@ -179,6 +184,15 @@ def _record(method: Method, case: Case) -> Record:
         "seconds": seconds,
         "iterations": solved.iterations,
     }
+
+
+def _solved(method: Method, case: Case) -> tuple[Solved, float]:
+    """Solve a case; return the result and the seconds."""
+    if method.peer:
+        case.mesh  # noqa: B018 - before the clock starts
+    clock = time.perf_counter()
+    solved = quietly(method, case)
+    return solved, time.perf_counter() - clock
 
 
 def figures(task: str, case: Case, result: Array) -> dict[str, float]:

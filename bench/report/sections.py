@@ -14,6 +14,7 @@ from report.methods import DEFAULT, methods
 from report.peers_developable import SAME_ENERGY
 from report.published import TABLE_1, TABLE_2, TABLE_3
 from report.quality import Record, Records
+from report.spread import Interval, of_means, of_runs
 
 #: Headings of columns, and formats of their numbers.
 HEADINGS = {
@@ -60,6 +61,11 @@ class Row:
         Median, 10th and 90th percentile, and the number of timed surfaces.
     seconds_numpy : dict of str to float
         The same of the solves with NumPy kernels; empty where these change nothing.
+    spread : dict of str to (float, float)
+        95 % intervals of the means over the surfaces, by bootstrap; under "seconds" the smallest
+        and the largest median of several runs.
+    from_default : dict of str to (float, float)
+        The same intervals of the difference from the section's default, surface by surface.
     iterations : float or None
         Mean number of iterations.
     note : str
@@ -74,6 +80,8 @@ class Row:
     figures: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     seconds_numpy: dict[str, float] = field(default_factory=dict)
+    spread: dict[str, Interval] = field(default_factory=dict)
+    from_default: dict[str, Interval] = field(default_factory=dict)
     iterations: float | None = None
     note: str = ""
     absent: str = ""
@@ -170,9 +178,13 @@ def rows(section: Section, records: Records) -> list[Row]:
         seconds = {"median": figures["seconds"]} if "seconds" in figures else {}
         found.append(Row(name, "paper", figures=own, seconds=seconds))
     given = {method.name: section.of(records, method) for method in section.methods}
-    found += [_row(method, given[method.name]) for method in section.methods]
     default = next(m for m in section.methods if m.name == section.default)
     whole = given[default.name]
+    for method in section.methods:
+        row = _row(method, given[method.name])
+        if row.source == "package" and method is not default:
+            row.from_default = _differences(given[method.name], whole)
+        found.append(row)
     for count in sorted({n for n in map(len, given.values()) if 0 < n < len(whole)}, reverse=True):
         name, note = f"{default.name}, first {count}", "to compare with rows of as many"
         found.append(replace(_row(default, whole[:count]), name=name, note=note))
@@ -187,6 +199,10 @@ def _row(method: Method, given: list[Record]) -> Row:
         return row
     row.figures = {k: float(np.mean([r["figures"][k] for r in good])) for k in good[0]["figures"]}
     row.seconds = _spread([r["seconds"] for r in good])
+    row.spread = _intervals([r["figures"] for r in good])
+    timed = [r for r in good if r["seconds"] is not None]
+    runs = of_runs([[r["seconds"], *r.get("again", ())] for r in timed])
+    row.spread |= {"seconds": runs} if runs else {}
     row.seconds_numpy = _spread([r.get("seconds_numpy") for r in good])
     if good[0]["iterations"] is not None:
         row.iterations = float(np.mean([r["iterations"] for r in good]))
@@ -196,6 +212,26 @@ def _row(method: Method, given: list[Record]) -> Row:
         errors = next(r["error"] for r in given if "error" in r)
         row.note = f"{row.note}; failed on {len(given) - len(good)}: {errors}".strip("; ")
     return row
+
+
+def _intervals(figures: list[dict[str, float]]) -> dict[str, Interval]:
+    """Return the interval of the mean of each figure."""
+    names = list(figures[0])
+    values = np.array([[found[name] for name in names] for found in figures])
+    return dict(zip(names, of_means(values), strict=True))
+
+
+def _differences(given: list[Record], default: list[Record]) -> dict[str, Interval]:
+    """Return the intervals of the mean differences from the default on the same surfaces."""
+    both = [
+        (a["figures"], b["figures"])
+        for a, b in zip(given, default, strict=False)
+        if "error" not in a and "error" not in b
+    ]
+    if not both:
+        return {}
+    shared = both[0][0].keys() & both[0][1].keys()
+    return _intervals([{k: a[k] - b[k] for k in sorted(shared)} for a, b in both])
 
 
 def _spread(seconds: list[float | None]) -> dict[str, Any]:

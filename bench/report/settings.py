@@ -17,6 +17,8 @@ class Settings:
         Largest number of surfaces of a method, by its pace.
     timed : int
         Number of surfaces that are timed, one after the other with no other work.
+    runs : int
+        Number of times that these are timed, for methods of the pace "fast".
     numpy : dict of str to int
         Largest number of those that are timed with NumPy kernels, too, by the method's pace.
     sizes : tuple of int
@@ -32,6 +34,7 @@ class Settings:
     name: str
     counts: dict[str, int] = field(default_factory=dict)
     timed: int = 64
+    runs: int = 3
     numpy: dict[str, int] = field(default_factory=dict)
     sizes: tuple[int, ...] = (16, 32, 64, 128, 256, 512)
     repeats: int = 5

@@ -146,7 +146,13 @@ def screened(folder: Path, split: str, store: Store, tick: Tick | None = None) -
 
     def draws() -> dict[str, np.ndarray]:
         with blas_threads(1):
-            selection = select(recipe.n, recipe.splits["hard"], seed=recipe.seed, tick=tick)
+            selection = select(
+                recipe.n,
+                recipe.splits["hard"],
+                seed=recipe.seed,
+                strata=recipe.strata,
+                tick=tick,
+            )
         every = list(tasks(recipe, selection, ()))
         return {s: np.concatenate([t.ids for t in every if t.split == s]) for s in _SCREENED}
 

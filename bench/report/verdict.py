@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from report.quality import Record, Records
 from report.sections import GIVEN, HEADINGS, SECTIONS, Section, lower_is_better
+from report.spread import Interval, of_means, of_runs
 from report.timing import Timing
 
 #: Name of the time, which is compared in addition to the metrics of a table.
@@ -33,6 +35,9 @@ class Winner:
         Number of surfaces of these means; 0 for the paper, whose surfaces are others.
     but : str
         The section's main metric of both, if the winner is worse in it.
+    spread, our_spread : tuple of float or None
+        95 % intervals of the means of winner and default; of times the smallest and the largest
+        median of several runs; None where they are not known.
     """
 
     name: str
@@ -42,11 +47,19 @@ class Winner:
     best_name: str
     count: int
     but: str = ""
+    spread: Interval | None = None
+    our_spread: Interval | None = None
 
     def __str__(self) -> str:
         where = f"{self.count:,} surfaces" if self.count else "published"
         but = f", but {self.but}" if self.but else ""
-        return f"{self.name} {self.theirs:.3g} (ours there {self.ours:.3g}, {where}{but})"
+        theirs = f"{self.name} {self.theirs:.3g}{_within(self.spread)}"
+        ours = f"{self.ours:.3g}{_within(self.our_spread)}"
+        return f"{theirs} (ours there {ours}, {where}{but})"
+
+
+def _within(spread: Interval | None) -> str:
+    return f" [{spread[0]:.3g}, {spread[1]:.3g}]" if spread else ""
 
 
 @dataclass(frozen=True)
@@ -123,7 +136,81 @@ def _winners(section: Section, metric: str, records: Records) -> Iterator[Winner
             continue
         known = {k: v for k, v in means.items() if v is not None and k not in _STARTS}
         best = min(known, key=lambda k: known[k] if lower_is_better(metric) else -known[k])
-        yield Winner(name, theirs, ours, known[best], best, len(where or ()), but)
+        given = (
+            section.of(records, next(m for m in section.methods if m.name == name)) if where else []
+        )
+        spreads = _interval(given, where, metric), _interval(default, where, metric)
+        yield Winner(name, theirs, ours, known[best], best, len(where or ()), but, *spreads)
+
+
+#: Rows of the package that stand for published ones of another name.
+_OWN = {"TNO": "TNO jiang2020"}
+
+
+def pairs(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Compare every published row with the row of its name, and hybrid with the cold solve.
+
+    Parameters
+    ----------
+    sections : dict
+        The sections of ``results.json``.
+
+    Returns
+    -------
+    list of dict
+        Section; metric; "other", the published row or the default; "own", the row of its name or
+        hybrid; the figures of both, "theirs" and "ours"; "low" and "high", the 95 % interval of
+        ours, or of the difference from the default for hybrid, or None; and "better": "ours",
+        "theirs", or "" where the interval contains the other figure, or no difference.
+    """
+    found = []
+    for name, section in sections.items():
+        rows = {row["name"]: row for row in section["rows"] if row["source"] != "paper"}
+        metrics = [m for m in section["columns"] if m not in GIVEN] + [TIME]
+        for row in (r for r in section["rows"] if r["source"] == "paper"):
+            own = rows.get(row["name"], rows.get(_OWN.get(row["name"], "")))
+            found += [_pair(name, m, row, own, "spread") for m in metrics if own is not None]
+        cold = next((s.default for s in SECTIONS if s.name == name), "")
+        if cold in rows and "hybrid" in rows and not rows["hybrid"]["absent"]:
+            found += [_pair(name, m, rows[cold], rows["hybrid"], "from_default") for m in metrics]
+    return [pair for pair in found if pair is not None]
+
+
+def _pair(
+    section: str, metric: str, other: Mapping[str, Any], own: Mapping[str, Any], kind: str
+) -> dict[str, Any] | None:
+    """Compare a figure of two rows; None where one of them does not have it."""
+    theirs, ours = (
+        row["seconds"].get("median") if metric == TIME else row["figures"].get(metric)
+        for row in (other, own)
+    )
+    if theirs is None or ours is None:
+        return None
+    low, high = own.get("spread" if metric == TIME else kind, {}).get(metric) or (None, None)
+    level = theirs if kind == "spread" or metric == TIME else 0.0
+    # Without an interval, figures that are equal to three digits are taken for equal.
+    equal = f"{ours:.3g}" == f"{theirs:.3g}" if low is None else low <= level <= high
+    winner = "theirs" if _better(metric, theirs, ours) else "ours"
+    who = {"section": section, "metric": metric, "own": own["name"]}
+    who |= {"other": other["name"], "published": other["source"] == "paper"}
+    return who | {
+        "theirs": theirs,
+        "ours": ours,
+        "low": low,
+        "high": high,
+        "better": "" if equal else winner,
+    }
+
+
+def _interval(records: list[Record], where: list[int] | None, metric: str) -> Interval | None:
+    """Return the spread of a mean over some surfaces or all, or of the times of several runs."""
+    where = list(range(len(records))) if where is None else where
+    some = [records[k] for k in where if k < len(records) and "error" not in records[k]]
+    if metric == TIME:
+        timed = [r for r in some if r["seconds"] is not None]
+        return of_runs([[r["seconds"], *r.get("again", ())] for r in timed])
+    values = [[r["figures"][metric]] for r in some if metric in r["figures"]]
+    return of_means(np.array(values))[0] if values else None
 
 
 def _better(metric: str, theirs: float, ours: float) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from itertools import product
+from itertools import groupby, product
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from report.published import NETS, TABLE_3
 from gso import dataset, net
 from gso.cli.progress import share
 from gso.dataset import LEVELS
+from gso.dataset.recipe import VERSION
 from gso.dataset.shapes import NAMES
 from gso.io import replacing
 from gso.io.json_file import write_json
@@ -119,6 +120,31 @@ def counted(found: dict[str, float], split: Any, most: int) -> dict[str, float]:
     return found | {"surfaces": min(len(split), most or len(split))}
 
 
+def cards() -> dict[str, Any]:
+    """Print what the cards say: kind of net, version of the data, hours, and chain of runs.
+
+    The hours are those of all runs of the chain. A run is named with the hours under its name
+    until then; ``>`` is a run that starts from the weights of the one before.
+    """
+    table = {}
+    for name in (name for name in net.available() if name not in catalogue.CHAINS):
+        card = catalogue.read_card(catalogue.located(name))
+        chain = [card]
+        while "begun_with" in chain[-1]:
+            chain.append(chain[-1]["begun_with"])
+        last = [next(group) for _, group in groupby(chain, key=lambda run: run["name"])]
+        table[name] = {
+            "kind": card["model"]["kind"],
+            "data": card["data"]["version"],
+            "steps": card["steps"],
+            "hours": round(sum(run["hours"] for run in last), 3),
+            "runs": len(chain),
+            "chain": " > ".join(f"{run['name']} {run['hours']:g}" for run in reversed(last)),
+        }
+    title = f"Cards of the nets; today's data have version {VERSION}"
+    return tabulate(title, ["net"], table)
+
+
 def rounding(data: Path, run: Path, n: int = 0) -> dict[str, Any]:
     """Print the change of every metric when the net of a run is stored in half precision."""
     split = dataset.open(data)["test"]
@@ -200,4 +226,4 @@ def _trained(blocks: int, channels: int, stride: int, data: Path, folder: Path) 
     return {"blocks": blocks, "channels": channels, **row}
 
 
-SECTIONS = (rows, rounding, curve, grid)
+SECTIONS = (rows, cards, rounding, curve, grid)

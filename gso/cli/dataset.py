@@ -44,6 +44,12 @@ def dataset() -> None:
     help="Small splits of other shapes: analytic surfaces, teapot, terrain.",
 )
 @click.option(
+    "--strata",
+    default="curvature",
+    type=click.Choice(["curvature", "features"]),
+    help="What is stratified: K_A and sigma^2, or all features of the paper.",
+)
+@click.option(
     "--reference",
     multiple=True,
     type=click.Choice(["jiang2020"]),
@@ -71,6 +77,7 @@ def build(
     seed: int,
     size: int,
     extras: bool,
+    strata: str,
     **given: Any,
 ) -> None:
     """Build a dataset of surfaces in the folder DIR.
@@ -86,7 +93,7 @@ def build(
     if "none" in labels and len(labels) > 1:
         raise OptionError("--label none goes with no other label")
     labels = () if labels == ("none",) else labels
-    recipe = sets.Recipe(n, seed, size, labels, extras)
+    recipe = sets.Recipe(n, seed, size, labels, extras, strata)
     start = time.perf_counter()
     with closing(progress.Counts()) as bars:
         data = sets.build(out, recipe, tick=bars.tick, **given)

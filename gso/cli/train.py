@@ -11,9 +11,11 @@ import click
 
 from gso.cli import progress
 from gso.cli import shared_options as shared
+from gso.errors import OptionError
 
 if TYPE_CHECKING:
     from gso.net.training.loop import Report
+    from gso.typing import Json
 
 #: Metrics that are shown beside the progress bar, if the task has them.
 _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
@@ -26,9 +28,14 @@ _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 @click.option("--data", metavar="DIR", required=True, type=click.Path(), help="Set of surfaces.")
 @click.option("--out", metavar="RUN", required=True, type=click.Path(), help="Folder of the run.")
 @click.option("--minutes", metavar="M", type=float, help="Length of the run, instead of its steps.")
+@click.option(
+    "--hours", metavar="[NET=]H", multiple=True, help="all: hours of every net, or of one."
+)
 @click.option("--steps", metavar="N", type=int, help="Steps of the run.")
+@click.option("--epochs", metavar="N", type=int, help="Passes over the surfaces, instead of steps.")
 @click.option("--seed", metavar="N", type=int, help="Seed of all random numbers.")
 @click.option("--fresh", metavar="N", type=int, help="Surfaces to draw beside those of the set.")
+@click.option("--sigma", metavar="S", type=float, help="denoise: the only noise to train for.")
 @click.option("--init", metavar="NET", help="Net to begin with.")
 @click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")
 @click.option("--teacher", metavar="NET", help="Net whose results are the labels.")
@@ -39,13 +46,16 @@ def train(
     data: str,
     out: str,
     minutes: float | None,
+    hours: tuple[str, ...],
+    sigma: float | None,
     device: str | None,
     quiet: bool,
     **changes: Any,
 ) -> None:
     """Train the net that CONFIG describes, a .toml or .json file or a name.
 
-    To resume an interrupted run, give the same command again. To train with several
+    CONFIG all trains every net of the package, one after the other, each in a folder of RUN. To
+    resume an interrupted run, give the same command again. To train with several
     processes, use torchrun: torchrun --nproc-per-node 2 -m gso train CONFIG ...
     """
     # Set before torch is imported: busily waiting threads slow each other on shared cores.
@@ -55,7 +65,17 @@ def train(
     from gso.net.training.loop import MODEL
     from gso.net.training.loop import train as run
 
-    made = read(config, **changes)
+    if config == "all":
+        given = {"minutes": minutes, "sigma": sigma}
+        wrong = [f"--{k}" for k, value in given.items() if value is not None]
+        wrong += [f"--{k}" for k in ("init", "through", "teacher") if changes.pop(k) is not None]
+        if wrong:
+            raise OptionError(f"{', '.join(wrong)} does not go with all")
+        _all(data, out, _hours(hours), device, quiet, changes)
+        return
+    if hours:
+        raise OptionError("--hours goes with all; give --minutes")
+    made = read(config, **changes, sigma=None if sigma is None else [sigma, sigma])
     with closing(progress.Counts()) as bars, progress.share() as show:
         card = run(
             made,
@@ -67,8 +87,56 @@ def train(
             tick=bars.tick,
         )
     if not quiet and card:
-        found = ", ".join(f"{name} {value:.4g}" for name, value in card["validation"].items())
-        click.echo(f"{out}/{MODEL}: {card['steps']} steps, {card['hours']} hours; {found}")
+        _tell(f"{out}/{MODEL}", card)
+
+
+def _all(
+    data: str,
+    out: str,
+    hours: float | dict[str, float] | None,
+    device: str | None,
+    quiet: bool,
+    changes: dict[str, Any],
+) -> None:
+    """Train every net of the package."""
+    from gso.net.training.loop import MODEL
+    from gso.net.training.shipped_nets import train_all
+
+    with closing(progress.Counts()) as bars, progress.share() as show:
+        cards = train_all(
+            data,
+            out,
+            hours=hours,
+            device=device,
+            show=lambda name, report: show(report.progress, f"{name}: {_text(report)}"),
+            tick=bars.tick,
+            **changes,
+        )
+    for name, card in cards.items():
+        if not quiet and card:
+            _tell(f"{out}/{name}/{MODEL}", card)
+
+
+def _hours(given: tuple[str, ...]) -> float | dict[str, float] | None:
+    """Read hours: one number for all nets, or NET=H for some; None for none."""
+    named: dict[str, float] = {}
+    try:
+        if len(given) == 1 and "=" not in given[0]:
+            return float(given[0])
+        for word in given:
+            name, value = word.split("=")
+            named[name] = float(value)
+    except ValueError:
+        raise OptionError(
+            f"--hours {' '.join(given)}: give one number, or NET=H for each net, such as net-c=1.5"
+        ) from None
+    return named or None
+
+
+def _tell(file: str, card: Json) -> None:
+    """Print what a run has come to."""
+    found = ", ".join(f"{name} {value:.4g}" for name, value in card["validation"].items())
+    click.echo(f"{file}: {card['steps']} steps, {card['hours']} hours; {found}")
 
 
 def _keep_memory() -> None:

@@ -128,6 +128,7 @@ def build(
                 recipe.n,
                 recipe.splits["hard"],
                 seed=recipe.seed,
+                strata=recipe.strata,
                 tick=partial(tick, "surfaces drawn"),
             )
         everything = list(tasks(recipe, selection, wanted))

@@ -8,7 +8,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 from gso.dataset import shapes
 from gso.dataset.labels import KINDS, LABELS
+from gso.dataset.screen import STRATA
 from gso.errors import OptionError
+from gso.spelling import choices
 from gso.typing import Json
 
 #: Incremented whenever the same recipe would give other surfaces or labels.
@@ -38,6 +40,9 @@ class Recipe:
         Labels of every surface: "developable", "strain", "lengths".
     extras : bool
         Whether to add the small named splits of :mod:`gso.dataset.shapes`.
+    strata : {"curvature", "features"}
+        Features whose intervals get fixed shares of the set: "curvature", K_A and sigma^2;
+        "features", K_P, K_N, K_A and sigma^2, as in the paper. See :mod:`gso.dataset.screen`.
 
     Raises
     ------
@@ -50,12 +55,15 @@ class Recipe:
     size: int = 64
     labels: tuple[str, ...] = LABELS
     extras: bool = True
+    strata: str = STRATA[0]
 
     def __post_init__(self) -> None:
         for name, least in (("n", 10), ("seed", 0), ("size", 16)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < least:
                 raise OptionError(f"{name} is {value!r}; it must be an integer, {least} or more")
+        if self.strata not in STRATA:
+            raise OptionError(f"strata is {self.strata!r}; {choices(self.strata, STRATA)}")
         object.__setattr__(self, "labels", tuple(self.labels))
         unknown = [k for k in self.labels if k not in LABELS]
         if unknown or len(set(self.labels)) < len(self.labels):
@@ -78,9 +86,13 @@ class Recipe:
 
     def as_dict(self) -> Json:
         """Return the recipe, its version and the solver's settings, for a manifest."""
+        given = asdict(self)
+        if self.strata == STRATA[0]:
+            # Sets that were made before there was a choice have no entry, and are the same.
+            del given["strata"]
         return {
             "version": VERSION,
-            **asdict(self),
+            **given,
             "labels": list(self.labels),
             "options": {name: KINDS[name].options for name in self.labels},
         }

@@ -4,7 +4,9 @@ Features (Wang et al. 2024, Eq. 1 and 2) are computed from 64 x 64 samples in th
 the means K_P, K_N, K_A of positive, negative and absolute Gaussian curvature, and the
 variance sigma^2 of the boundary lengths. Each cell of :data:`CURVATURE` times :data:`SHAPE`
 accepts draws in order until it has its share of the set; with these shares the mean K_A is
-the published 0.307. Draws beyond the last intervals form the separate split "hard".
+the published 0.307. With the strata "features" cells are also divided by :data:`BALANCE`, the
+positive share K_P / K_A. As K_A is K_P - K_N, this gives every interval of K_P and of K_N its
+share, too. Draws beyond the last intervals form the separate split "hard".
 """
 
 from __future__ import annotations
@@ -29,6 +31,12 @@ CURVATURE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 CURVATURE_SHARES = (0.18, 0.20, 0.19, 0.13, 0.10, 0.08, 0.05, 0.04, 0.03)
 SHAPE = (0.0, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5)
 SHAPE_SHARES = (0.24, 0.25, 0.19, 0.13, 0.11, 0.08)
+#: Intervals of K_P / K_A and their shares, for the strata "features": close to the quartiles of
+#: unscreened draws, and six percent at either end, mostly negative or mostly positive K.
+BALANCE = (0.0, 0.1, 0.24, 0.39, 0.53, 0.67, 1.0)
+BALANCE_SHARES = (0.06, 0.19, 0.25, 0.25, 0.19, 0.06)
+#: What a set is stratified by: K_A and sigma^2, or K_P, K_N, K_A and sigma^2.
+STRATA = ("curvature", "features")
 #: Kinds of hard draws, a third of the split each. Curved: K_A up to the published limit on
 #: the sum of |K| (15000 over 62 x 62 vertices). Wild: K_A above it. Uneven: only sigma^2 is
 #: large.
@@ -74,7 +82,12 @@ def features(points: Array) -> Array:
 
 
 def select(
-    count: int, hard: int, *, seed: int, tick: Callable[[int, int], None] | None = None
+    count: int,
+    hard: int,
+    *,
+    seed: int,
+    strata: str = "curvature",
+    tick: Callable[[int, int], None] | None = None,
 ) -> Selection:
     """Draw surfaces until every cell and every kind of hard draw has its share.
 
@@ -84,6 +97,8 @@ def select(
         Number of surfaces of the set, and of the hard split.
     seed : int
         Seed of the draws.
+    strata : {"curvature", "features"}
+        Features whose intervals make the cells; see :data:`STRATA`.
     tick : callable, optional
         Progress callback, called with the number of selected surfaces and the total number.
 
@@ -93,7 +108,7 @@ def select(
     >>> len(set(selection.main) | set(selection.hard))
     13
     """
-    room = np.r_[quotas(count), _rounded(np.full(len(HARD), 1.0 / len(HARD)), hard)]
+    room = np.r_[quotas(count, strata), _rounded(np.full(len(HARD), 1.0 / len(HARD)), hard)]
     cells = len(room) - len(HARD)
     kept: list[Ints] = []
     cell_of: list[Ints] = []
@@ -106,7 +121,7 @@ def select(
         numbers = np.arange(start, start + _BLOCK)
         points = sample_many([surface(seed, int(k)) for k in numbers], SIZE)
         good = np.flatnonzero(_sound(points))
-        cell = _cell(features(points[good]))
+        cell = _cell(features(points[good]), strata)
         taken = _rank(cell) < room[cell]
         room -= np.bincount(cell[taken], minlength=len(room))
         kept.append(numbers[good[taken]])
@@ -120,14 +135,35 @@ def select(
     return Selection(draws[main][order], draws[~main], start)
 
 
-def quotas(count: int) -> Ints:
-    """Return the number of surfaces per cell, row by row (intervals of K_A, then of sigma^2).
+def quotas(count: int, strata: str = "curvature") -> Ints:
+    """Return the number of surfaces per cell, row by row.
+
+    Rows are intervals of K_A, then of sigma^2, then, for the strata "features", of K_P / K_A.
 
     >>> int(quotas(10401).sum()), int(quotas(10401).min())
     (10401, 25)
+    >>> int(quotas(10401, "features").sum())
+    10401
     """
     rows = _rounded(np.array(CURVATURE_SHARES), count)
-    return np.concatenate([_rounded(np.array(SHAPE_SHARES), row) for row in rows])
+    room = np.concatenate([_rounded(np.array(SHAPE_SHARES), row) for row in rows])
+    return _carried(np.array(BALANCE_SHARES), room) if strata == "features" else room
+
+
+def _carried(shares: Array, rows: Ints) -> Ints:
+    """Divide each row by the shares; what rounding leaves is carried to the rows after it.
+
+    Most cells have few surfaces, so that rounding each row alone would change the shares.
+    """
+    out, left = [], np.zeros(len(shares))
+    for row in rows:
+        left = left + row * shares
+        part = np.zeros(len(shares), np.int64)
+        for _ in range(row):
+            part[np.argmax(left - part)] += 1
+        left = left - part
+        out.append(part)
+    return np.concatenate(out)
 
 
 def _spread(cell: Ints, rng: np.random.Generator) -> Ints:
@@ -157,13 +193,17 @@ def _sound(points: Array) -> Flags:
         return np.asarray(np.sqrt((normal**2).sum(axis=-1)).min(axis=(1, 2)) > _SMALLEST_CELL)
 
 
-def _cell(values: Array) -> Ints:
+def _cell(values: Array, strata: str) -> Ints:
     """Return the cell of each row of features; kinds of hard draws are numbered last."""
     k, s = values[:, FEATURES.index("K_A")], values[:, FEATURES.index("sigma2")]
     rows = np.searchsorted(CURVATURE[1:-1], k)
     columns = np.searchsorted(SHAPE[1:-1], s)
     first = len(CURVATURE_SHARES) * len(SHAPE_SHARES)
     out = rows * len(SHAPE_SHARES) + columns
+    if strata == "features":
+        positive = values[:, FEATURES.index("K_P")] / np.maximum(k, 1e-300)
+        first *= len(BALANCE_SHARES)
+        out = out * len(BALANCE_SHARES) + np.searchsorted(BALANCE[1:-1], positive)
     out = np.where(s > SHAPE[-1], first + HARD.index("uneven"), out)
     out = np.where(k > CURVATURE[-1], first + HARD.index("curved"), out)
     return np.where(k > CURVED, first + HARD.index("wild"), out)

@@ -18,7 +18,7 @@ TASK = NetTask(
     default="denoise",
     score="theta",
     figures=figures,
-    terms=("in", "fair", "gc"),
+    terms=("in", "fair", "gc", "loss_gc"),
     noisy=True,
     warm_start=False,
 )

@@ -60,7 +60,7 @@ TASK = NetTask(
     default="developable",
     score="score",
     figures=figures,
-    terms=("in", "fair", "gc", "k_left", "d_h", "fair_ratio", "label"),
+    terms=("in", "fair", "gc", "loss_gc", "k_left", "d_h", "fair_ratio", "label"),
     energy=energy,
     refines=True,
 )

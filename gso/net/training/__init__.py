@@ -10,9 +10,20 @@ if TYPE_CHECKING:
     from gso.net.training.config import Config, Phase, from_dict, read
     from gso.net.training.data import Batch
     from gso.net.training.phase_objective import Objective
+    from gso.net.training.shipped_nets import HOURS
     from gso.net.training.solver_energy import Developable, Strain
 
-__all__ = ["Batch", "Config", "Developable", "Objective", "Phase", "Strain", "from_dict", "read"]
+__all__ = [
+    "HOURS",
+    "Batch",
+    "Config",
+    "Developable",
+    "Objective",
+    "Phase",
+    "Strain",
+    "from_dict",
+    "read",
+]
 
 # The tasks of nets are read without PyTorch.
 __getattr__, __dir__ = at_first_use(
@@ -21,6 +32,7 @@ __getattr__, __dir__ = at_first_use(
         "config": "Config Phase from_dict read",
         "data": "Batch",
         "phase_objective": "Objective",
+        "shipped_nets": "HOURS",
         "solver_energy": "Developable Strain",
     },
 )

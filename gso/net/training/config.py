@@ -27,7 +27,7 @@ AUGMENTATIONS = ("none", "symmetries", "shear")
 LARGEST_STRIDE = 4
 #: All terms of the loss "published": published losses, metrics of results, and the label.
 TERMS = (
-    *("in", "fair", "gc", "k_left", "d_h", "fair_ratio"),
+    *("in", "fair", "gc", "loss_gc", "k_left", "d_h", "fair_ratio"),
     *("iso", "iso_w", "iso_cell", "iso_cell_w", "label"),
 )
 
@@ -46,15 +46,17 @@ class Phase:
     share : float
         Length of the phase, relative to the other phases.
     rate : float
-        Learning rate at the start of the phase, after a warm-up in the first one.
+        Learning rate at the start of the phase, after the run's `warm_up` in the first one.
     final_rate : float
-        Learning rate at the end of the phase; between the two it follows a cosine.
+        Learning rate at the end of the phase; between the two it follows a cosine. Equal to
+        `rate` it makes the rate constant.
     batch : int
         Surfaces per step, summed over all processes.
     clip : float
         Bound on the norm of the gradient, which is scaled down to it.
     weights : dict
-        "published": the factor of each term; "label" is one of the terms. "energy"
+        "published": the factor of each term; "label" is one of the terms. "gc" is mean \|K\|
+        over both triangulations of the cells, "loss_gc" over the published one. "energy"
         (developable): `w_curvature`, `w_fairness`, `w_proximity` replace those of the task's
         options. Each surface's energy is divided by its design's energy to the power
         `balance`: with 1 all surfaces have equal weight, with 0 the curved ones dominate.
@@ -122,6 +124,11 @@ class Config:
         Phases of training, in sequence.
     steps : int
         Steps of the whole run; a limit in minutes replaces it.
+    epochs : int
+        Passes over the surfaces of the run, in place of `steps`; 0 for `steps`. All phases
+        must then have the same batch and see the same surfaces.
+    warm_up : float
+        Fraction of the run over which the learning rate rises from zero.
     seed : int
         Seed of all random numbers.
     limit : int
@@ -165,6 +172,8 @@ class Config:
     model: Mapping[str, object]
     phases: tuple[Phase, ...]
     steps: int = 10_000
+    epochs: int = 0
+    warm_up: float = 0.01
     seed: int = 0
     limit: int = 0
     fresh: int = 0
@@ -188,13 +197,15 @@ class Config:
         _choice("augment", self.augment, AUGMENTATIONS)
         _choice("against", self.against, ("seen", "designs"))
         _choice("optimiser", self.optimiser, OPTIMISERS)
-        for name in ("steps", "validate", "limit", "fresh", "seed"):
+        for name in ("steps", "validate", "limit", "fresh", "seed", "epochs"):
             _whole(name, getattr(self, name), int(name in ("steps", "validate")))
-        for name in ("ema", "weight_decay", "validate_every", "checkpoint_every"):
+        for name in ("ema", "weight_decay", "warm_up", "validate_every", "checkpoint_every"):
             as_positive(getattr(self, name), name, zero=True)
         _pair("sigma", self.sigma)
         if not self.ema < 1 or not self.sigma[0] <= self.sigma[1]:
             raise OptionError("ema must be below 1, and sigma two positive numbers that rise")
+        if self.warm_up > 1:
+            raise OptionError(f"warm_up is {self.warm_up:g}; it is a fraction of the run, 0 to 1")
         if not self.phases:
             raise OptionError("a configuration needs [[phase]] tables")
         if self.teacher and tasks.get(self.task).noisy:
@@ -205,8 +216,20 @@ class Config:
             raise OptionError("teacher: no phase learns labels; give one the weight 'label'")
         if not self.name or Path(self.name).name != self.name:
             raise OptionError(f"name {self.name!r} is no file name")
+        if self.epochs and len({(phase.batch, phase.labelled) for phase in self.phases}) > 1:
+            raise OptionError(
+                "epochs: the phases have other batches, or other surfaces with labels; give steps"
+            )
         for phase in self.phases:
             _fits(self, phase)
+
+    def steps_for(self, count: int) -> int:
+        """Return the steps of a run on a number of surfaces.
+
+        >>> read("paper-flatten").steps_for(8320)
+        32500
+        """
+        return -(-self.epochs * count // self.phases[0].batch) if self.epochs else self.steps
 
     def as_dict(self) -> Json:
         """Return the configuration as a dictionary with the layout of its file."""
@@ -245,7 +268,8 @@ def read(path: AnyPath, **changes: object) -> Config:
     path : path
         File, or the name of a configuration in ``gso/net/configs``.
     changes
-        Values that replace those of the file, unless they are None.
+        Values that replace those of the file, unless they are None. `steps` also replaces the
+        file's `epochs`.
 
     Raises
     ------
@@ -272,7 +296,10 @@ def read(path: AnyPath, **changes: object) -> Config:
         raise OptionError(f"{path} is no configuration: {error}") from None
     if not isinstance(given, dict):
         raise OptionError(f"{path} must hold a table")
-    return from_dict(given | {k: v for k, v in changes.items() if v is not None})
+    made = {k: v for k, v in changes.items() if v is not None}
+    if {"steps", "epochs"} <= made.keys():
+        raise OptionError("steps and epochs both give the length of the run; take one")
+    return from_dict(given | ({"epochs": 0} if "steps" in made else {}) | made)
 
 
 def from_dict(given: Mapping[str, object]) -> Config:

@@ -89,6 +89,10 @@ class Source:
             return self
         return Source(*(None if x is None else x.to(device) for x in arrays))  # type: ignore[arg-type]
 
+    def count(self, phase: Phase) -> int:
+        """Return the number of surfaces that a phase sees: those with labels, if it needs them."""
+        return len(self.labels if phase.labelled and self.labels is not None else self.surfaces)
+
     def batch(
         self,
         config: Config,
@@ -106,7 +110,7 @@ class Source:
         if phase.labelled and self.labels is None:
             raise DatasetError(f"there are no labels {config.label!r} to learn")
         labels = self.labels if phase.labelled else None
-        count = len(self.surfaces if labels is None else labels)
+        count = self.count(phase)
         rows = _rows(count, phase.batch, step, config.seed).to(self.surfaces.device)
         generator = torch.Generator().manual_seed(_seed(config.seed, _CHANGES, step))
         arrays = {"surface": self.surfaces}

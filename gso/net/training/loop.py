@@ -125,7 +125,7 @@ def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable
     validated = kept = run.spent
     losses: list[Tensor] = []
     while (progress := run.progress) < 1.0:
-        at = place(config.phases, progress)
+        at = place(config.phases, progress, config.warm_up)
         batch = run.source.batch(
             config, at.phase, run.step, rank=here.rank, world=here.world, device=here.device
         )

@@ -66,6 +66,7 @@ _TERMS: dict[str, Term] = {
     "fair": lambda result, _: training_losses.fair(result),
     "fair_ratio": training_losses.fair_ratio,
     "gc": lambda result, _: training_losses.gc(result),
+    "loss_gc": lambda result, _: training_losses.loss_gc(result),
     "k_left": training_losses.k_left,
     "d_h": training_losses.d_h,
     "iso": lambda flat, surface: training_losses.iso(surface, flat),

@@ -59,8 +59,13 @@ class Run:
     def progress(self) -> float:
         """Completed fraction of the run; it is the same in all processes."""
         if self.limit is None:
-            return self.step / self.config.steps
+            return self.step / self.steps
         return self.here.agreed(self.spent / self.limit)
+
+    @property
+    def steps(self) -> int:
+        """Steps of the run, unless a limit in minutes replaces them."""
+        return self.config.steps_for(self.source.count(self.config.phases[0]))
 
     def follow(self) -> None:
         """Update the moving average of the weights."""
