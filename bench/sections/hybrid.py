@@ -39,9 +39,12 @@ CASES: dict[str, Case] = {
 }
 #: Numbers of iterations at which the curve of the section "anytime" has points.
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
-#: Vertices along the sides of the section "sizes", by preset, and surfaces relative to the first.
-SIZES = {"balanced": (64, 128, 256, 512), "accurate": (64, 128, 256)}
-SHARES = {64: 1.0, 128: 0.5, 256: 0.25, 512: 0.125}
+#: Vertices along the sides of grids of the sections "sizes" and "model", by preset, and the share
+#: of the surfaces that are solved at this size.
+SIZES = {
+    "balanced": {64: 1.0, 128: 0.5, 256: 0.25, 512: 0.125},
+    "accurate": {64: 0.5, 128: 0.25, 256: 0.1},
+}
 #: Share of the energy that the cold solve "ended as early" leaves to further iterations: that of
 #: :func:`gso.hybrid.solve`.
 EARLY = 3e-3
@@ -175,8 +178,8 @@ def _by_size(n: int, data: Path | None, name: str) -> dict[tuple[str, str], dict
     """Compare surfaces of a split on grids of all sizes; fewer of the larger ones."""
     surfaces, found = split(name, data), {}
     for preset, sides in SIZES.items():
-        for side in sides:
-            count = min(max(round(n * SHARES[side]), 2), len(surfaces))
+        for side, share in sides.items():
+            count = min(max(round(n * share), 2), len(surfaces))
             grids = [resample(np.asarray(surfaces[k], float), side, side) for k in range(count)]
             case: Case = ("developable", {"options": preset})
             quietly(hybrid.solve, grids[0], options=preset)
