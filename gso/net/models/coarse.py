@@ -10,7 +10,7 @@ from gso.errors import OptionError
 from gso.net.models import inputs
 from gso.net.models.base import Net
 from gso.net.models.blocks import Residual
-from gso.net.models.grid_geometry import Frame, planes
+from gso.net.models.grid_geometry import Frame, planes, points
 from gso.net.models.resampling import spline_field
 
 
@@ -160,7 +160,7 @@ class CoarseNet(Net):
         return self.unit * both
 
     def _vectors(self, shares: Tensor, frame: Frame) -> Tensor:
-        return shares.movedim(1, -1) if self.kind.flat else frame.combine(shares)
+        return shares.movedim(1, -1) if self.kind.flat else points(frame.vectors(*shares.unbind(1)))
 
 
 def _joined(known: Tensor, state: list[Tensor], moved: Tensor) -> Tensor:

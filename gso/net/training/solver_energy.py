@@ -165,7 +165,7 @@ class Strain:
 
     def __post_init__(self) -> None:
         p = planes(self.surface)
-        cell = grid_geometry.corners(p)
+        cell = geometry.cell_corners(p)
         rest, self.sound = [], []
         for a, b, c in stretch.corners_of(4):
             frame = geometry.rest_frame(cell[a], cell[b], cell[c])
@@ -179,7 +179,7 @@ class Strain:
 
     def residuals(self, flat: Tensor) -> Tensor:
         """Compute strain residuals (12, B, H-1, W-1); see :func:`gso.energy.stretch.residual`."""
-        r = torch.stack(stretch.residual(grid_geometry.corners(planes(flat)), self.rest))
+        r = torch.stack(stretch.residual(geometry.cell_corners(planes(flat)), self.rest))
         good = torch.stack(self.sound)
         return torch.where(good.repeat(3, 1, 1, 1), r, torch.zeros_like(r))
 
