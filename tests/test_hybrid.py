@@ -12,7 +12,7 @@ import gso
 from gso import IsometryOptions as JointOptions
 from gso import MeshError, OptionError, WeightsError, hybrid, tno
 from gso.hybrid import net_saves_time
-from gso.hybrid.patch import as_patch
+from gso.parametrization import as_patch
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
 from gso.pipeline import Run

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gso import Mesh, energy, geometry, metrics, parametrization
-from gso.hybrid import patch
+from gso.parametrization import patch
 from gso.mesh import vertex_normals
 from tests.conftest import saddle
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from gso.net.inference.prediction import predict
     from gso.net.models.coarse import CoarseNet
     from gso.net.models.gsonet import GSONet
+    from gso.net.onnx_file import export
     from gso.net.tasks import add_task
     from gso.net.training.loop import train
     from gso.net.weights import KINDS, add_kind, kind_of, load, make, save
@@ -23,6 +24,7 @@ __all__ = [
     "add_kind",
     "add_task",
     "available",
+    "export",
     "kind_of",
     "load",
     "located",
@@ -38,6 +40,7 @@ __getattr__, __dir__ = at_first_use(
     __name__,
     {
         "catalogue": "CHAINS available located read_card",
+        "onnx_file": "export",
         "inference.prediction": "predict",
         "models.coarse": "CoarseNet",
         "models.gsonet": "GSONet",

@@ -14,8 +14,8 @@ from safetensors.torch import save as packed
 from gso.errors import GSOError, OptionError, WeightsError
 from gso.io.atomic import write_bytes
 from gso.io.json_file import write_json
-from gso.net.catalogue import FORMAT, located, read_card
-from gso.net.models.base import Net
+from gso.net.catalogue import FORMAT, card_of, exported, located, modified, verified
+from gso.net.models.base import Net, device_of
 from gso.net.models.coarse import CoarseNet
 from gso.net.models.gsonet import GSONet
 from gso.spelling import choices
@@ -23,8 +23,6 @@ from gso.typing import AnyPath, Json
 
 #: Kinds of nets, as cards and configurations name them; :func:`add_kind` adds to them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
-#: Size limit of files in bytes, far above that of any net of this package.
-_LARGEST = 1 << 30
 
 
 def add_kind(name: str, cls: type[Net]) -> None:
@@ -114,40 +112,54 @@ def save(
     }
     target = Path(path)
     write_bytes(target, data)
-    write_json(target.with_suffix(".json"), record)
+    write_json(card_of(target), record)
     return record
 
 
-def load(model: AnyPath, *, device: str | torch.device = "cpu") -> Net:
-    """Load a net in evaluation mode; no code in the files is executed.
+def load(model: AnyPath, device: str | torch.device | None = None) -> Net:
+    """Load a net with its weights, an ``nn.Module`` in evaluation mode.
+
+    No code in the files is executed.
 
     Parameters
     ----------
     model : str or path
-        Name of a net that comes with the package (see :func:`available`), or a
+        Name of a net that comes with the package (see :func:`gso.net.available`), or a
         .safetensors file with its card beside it.
-    device : str or torch.device
-        Device of the net.
+    device : str or torch.device, optional
+        Device of the net: "cpu", "cuda" ...; by default the GPU if there is one.
+
+    Returns
+    -------
+    Net
+        It maps grids (B, H, W, 3) of the unit ball, in single precision, to results
+        (B, H, W, 3), or to flat images (B, H, W, 2). :func:`gso.net.predict` applies it to
+        surfaces of any size and position.
 
     Raises
     ------
+    OptionError
+        There is no such device.
     WeightsError
         The file or its card is missing or damaged, they do not belong together, or the file
         does not hold the net that the card describes.
+
+    Examples
+    --------
+    >>> net = load("developable", device="cpu")
+    >>> net.task, net.training, isinstance(net, torch.nn.Module)
+    ('developable', False, True)
     """
     path = located(model)
-    card = read_card(path)
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST:
-            raise WeightsError(f"{path} has {size} bytes: no net of this package")
-        data = path.read_bytes()
-    except OSError as error:
-        raise WeightsError(f"{path} cannot be read: {error.strerror}") from None
-    if hashlib.sha256(data).hexdigest() != card["sha256"]:
-        raise WeightsError(f"{path} is damaged: it is not the file that its card describes")
+    if exported(path):
+        raise WeightsError(
+            f"{path} is an exported net, without weights to load; "
+            "give it to gso.net.predict, or load the .safetensors file"
+        )
+    where = device if isinstance(device, torch.device) else device_of(device)
+    card, data = verified(path)
     net = _filled(card["model"], data, path)
-    return placed(net, device).eval()
+    return placed(net, where).eval()
 
 
 def placed(net: Net, device: str | torch.device) -> Net:
@@ -176,11 +188,7 @@ def _filled(settings: Json, data: bytes, path: Path) -> Net:
 
 def cached(path: Path, device: torch.device) -> Net:
     """Load a net with :func:`load`, and cache it by path, device and modification time."""
-    try:
-        stamp = path.stat().st_mtime_ns
-    except OSError:
-        stamp = 0
-    return _cached(path, device, stamp)
+    return _cached(path, device, modified(path))
 
 
 @lru_cache(maxsize=8)

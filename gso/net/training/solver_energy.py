@@ -190,6 +190,10 @@ class Strain:
 
     def __call__(self, flat: Tensor) -> Tensor:
         """Compute the energy (B,) of flat images (B, H, W, 2), divided by their typical strain."""
+        return sum(self.parts(flat).values())  # type: ignore[return-value]
+
+    def parts(self, flat: Tensor) -> dict[str, Tensor]:
+        """Compute the weighted energy (B,) of each term, divided by the typical strain."""
         o = self.options
         r = self.residuals(flat)
         level = self.level(r.detach()).clamp_min(_LEAST_STRAIN)[:, None, None].expand_as(r[0])
@@ -205,8 +209,7 @@ class Strain:
             (change,) = edges.residual([origin, d], [inverse])
             total = total + absolute.value(change).sum(dim=(1, 2))
             count += change[0].numel()
-        energy: Tensor = cost / typical + o.w_edges * total / count
-        return energy
+        return {"strain": cost / typical, "edges": o.w_edges * total / count}
 
 
 def _edges(p: Planes) -> list[Planes]:
