@@ -12,9 +12,9 @@ import gso
 from gso import IsometryOptions as JointOptions
 from gso import MeshError, OptionError, WeightsError, hybrid, tno
 from gso.hybrid import net_saves_time
-from gso.parametrization import as_patch
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
+from gso.parametrization import as_patch
 from gso.pipeline import Run
 from gso.tno import Start
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap

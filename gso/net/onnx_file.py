@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import math
 import warnings
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -124,18 +128,11 @@ def _write(net: Net, path: Path, passes: int) -> None:
 
 def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> bytes:
     """Return the content of the ONNX file of a net."""
-    try:
-        from onnxscript import opset18 as op
-    except ImportError:
+    if any(find_spec(name) is None for name in ("onnx", "onnxscript")):
         raise BackendError(
             'the export of nets needs onnx and onnxscript: pip install ".[onnx]" in the folder of '
             "gso"
-        ) from None
-
-    def hypot(x: Any, y: Any) -> Any:
-        """ONNX has no such operator."""
-        return op.Sqrt(op.Add(op.Mul(x, x), op.Mul(y, y)))
-
+        )
     own = copy.deepcopy(net).cpu().eval().requires_grad_(False)
     own.bf16 = False
     module = _Exported(own, passes).eval()
@@ -156,7 +153,7 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
                 input_names=inputs,
                 output_names=outputs,
                 opset_version=OPSET,
-                custom_translation_table={torch.ops.aten.hypot.default: hypot},
+                custom_translation_table=_operators(),
                 dynamo=True,
                 verbose=False,
             )
@@ -165,3 +162,31 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
             raise BackendError(f"the net cannot be exported: {error}") from error
     content: bytes = program.model_proto.SerializeToString()
     return content
+
+
+def _operators() -> dict[Any, Callable[..., Any]]:
+    """Return ONNX forms of the functions of PyTorch that have none, or only a coarse one."""
+    op: Any = import_module("onnxscript").opset18
+    double, single = 11, 1  # ONNX's numbers of the types
+
+    def hypot(x: Any, y: Any) -> Any:
+        return op.Sqrt(op.Add(op.Mul(x, x), op.Mul(y, y)))
+
+    def atan2(y: Any, x: Any) -> Any:
+        # Curvature is a small difference of angles, so that the rounding of angles decides about
+        # the nets' inputs. ONNX Runtime has the arc tangent in single precision only: a step of
+        # Newton's method in double precision makes the angle exact.
+        u, v = op.Cast(x, to=double), op.Cast(y, to=double)
+        zero, one, two, pi, tiny = (
+            op.CastLike(op.Constant(value_float=value), u)
+            for value in (0.0, 1.0, 2.0, math.pi, 1e-30)
+        )
+        length = op.Max(hypot(u, v), tiny)
+        ratio = op.Div(v, op.Add(length, op.Abs(u)))
+        acute = op.Mul(two, op.Cast(op.Atan(op.Cast(ratio, to=single)), to=double))
+        obtuse = op.Sub(op.Mul(op.Where(op.Less(v, zero), op.Neg(one), one), pi), acute)
+        near = op.Where(op.Less(u, zero), obtuse, acute)
+        miss = op.Sub(op.Mul(v, op.Cos(near)), op.Mul(u, op.Sin(near)))
+        return op.CastLike(op.Add(near, op.Div(miss, length)), x)
+
+    return {torch.ops.aten.hypot.default: hypot, torch.ops.aten.atan2.default: atan2}

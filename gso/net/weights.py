@@ -18,11 +18,26 @@ from gso.net.catalogue import FORMAT, card_of, exported, located, modified, veri
 from gso.net.models.base import Net, device_of
 from gso.net.models.coarse import CoarseNet
 from gso.net.models.gsonet import GSONet
+from gso.registry import Plugins
 from gso.spelling import choices
 from gso.typing import AnyPath, Json
 
 #: Kinds of nets, as cards and configurations name them; :func:`add_kind` adds to them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
+
+
+def _no_net(found: object) -> str:
+    is_net = isinstance(found, type) and issubclass(found, Net)
+    return "" if is_net else "it is no subclass of gso.net.models.Net"
+
+
+#: Kinds of nets of installed packages.
+_PLUGINS = Plugins("gso.net.kinds", _no_net)
+
+
+def _kinds() -> dict[str, type[Net]]:
+    """Return all kinds, those of installed packages among them."""
+    return {**dict(_PLUGINS.items()), **KINDS}
 
 
 def add_kind(name: str, cls: type[Net]) -> None:
@@ -41,7 +56,7 @@ def add_kind(name: str, cls: type[Net]) -> None:
     OptionError
         The name is taken, or `cls` is not a subclass of Net.
     """
-    if name in KINDS:
+    if name in KINDS or name in _PLUGINS.names():
         raise OptionError(f"{name!r} is taken among the kinds of nets; choose another name")
     if not (isinstance(cls, type) and issubclass(cls, Net)):
         raise OptionError(f"{cls!r} is not a subclass of gso.net.models.base.Net")
@@ -63,17 +78,20 @@ def make(settings: Json) -> Net:
     """
     rest = dict(settings)
     kind = rest.pop("kind", None)
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise OptionError(f"no kind {kind!r} of net; {choices(kind, KINDS)}")
+    cls = KINDS.get(kind) or _PLUGINS.get(kind) if isinstance(kind, str) else None
+    if cls is None:
+        known = [*KINDS, *_PLUGINS.names()]
+        raise OptionError(f"no kind {kind!r} of net; {choices(kind, known)}")
     try:
-        return KINDS[kind](**rest)
+        made: Net = cls(**rest)
+        return made
     except (TypeError, ValueError, AttributeError) as error:
         raise OptionError(f"settings of the net: {error}") from None
 
 
 def kind_of(net: Net) -> str:
     """Return the kind of a net, as cards name it."""
-    return next(name for name, cls in KINDS.items() if type(net) is cls)
+    return next(name for name, cls in _kinds().items() if type(net) is cls)
 
 
 def save(
