@@ -87,7 +87,7 @@ def solve(
         "curvature". Elsewhere the result is that of :func:`gso.tno.optimize`.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
-        `max_deviation`, `max_strain`, `target_curvature`, `unit`, `callback`, `verdict`.
+        `max_deviation`, `max_strain`, `target_curvature`, `unit`, `callback`, `terms`, `verdict`.
 
     Returns
     -------
@@ -268,7 +268,7 @@ def _checked(task: str, polish: bool | int, keywords: Keywords) -> bool | int:
     signature(optimize).bind(None, **keywords)
     if "x0" in keywords:
         raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
-    names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature")
+    names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature", "terms")
     check(task, **{name: keywords[name] for name in names if name in keywords})
     polish = bool(polish) if isinstance(polish, bool | np.bool_) else int(polish)
     for name in ("max_strain", "target_curvature"):

@@ -50,7 +50,10 @@ TASK = Task({"whole": Formulation(Own, plan)}, lambda *_: {"displacement_rms": 1
 BACKEND = """
 from gso import linalg
 own = linalg.find("superlu")
-Solver, available, cost, PACKAGE = own.Solver, own.available, own.cost, "scipy"
+available, cost, PACKAGE = own.available, own.cost, "scipy"
+
+class Solver(own.Solver):
+    name = "mine"
 """
 FORMAT = """
 import numpy as np
