@@ -59,7 +59,7 @@ def test_a_term_joins_the_objective(make):
 def test_a_term_is_built_for_every_level():
     own = Own(weight=1e-3)
     result = gso.tno.optimize(saddle(65), terms=[own])
-    assert result.verdict is not None
+    assert "strain_max" in result.metrics
     sides = {mesh.grid_shape[0] for mesh in own.meshes}
     assert len(sides) > 1 and max(sides) == 65
     for mesh in own.meshes:
@@ -71,7 +71,10 @@ def test_a_term_is_built_for_every_level():
 
 
 def test_a_term_without_weight_changes_nothing():
-    plain, result = (gso.tno.optimize(saddle(33), terms=terms) for terms in ((), [Own(weight=0.0)]))
+    plain, result = (
+        gso.tno.optimize(saddle(33), formulation="curvature", terms=terms)
+        for terms in ((), [Own(weight=0.0)])
+    )
     np.testing.assert_array_equal(result.mesh.vertices, plain.mesh.vertices)
 
 
