@@ -29,6 +29,9 @@ from gso.net import (  # noqa: E402
 )
 from tests.test_net import shaken  # noqa: E402
 
+# An export takes ten seconds, also of a small net.
+pytestmark = pytest.mark.slow
+
 SMALL = {"widths": (8, 8, 8), "depths": (1, 1, 1)}
 #: Equal to this, in radii of the unit ball.
 CLOSE = 1e-4
@@ -238,7 +241,6 @@ except gso.BackendError as error:
     assert 'pip install ".[onnx]"' in run_without("onnxruntime", code, tmp_path)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", available())
 def test_every_net_of_the_package(name, tmp_path):
     task = load(CHAINS.get(name, (name,))[0]).task

@@ -141,17 +141,17 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
     # Fills the cache of spline bases, which become constants of the graph.
     module(*example)
     batch = torch.export.Dim("batch")
+    shapes = {name: {0: batch} for name in inputs}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            traced = torch.export.export(
-                module, example, dynamic_shapes={name: {0: batch} for name in inputs}, strict=False
-            )
+            traced = torch.export.export(module, example, dynamic_shapes=shapes, strict=False)
             program: Any = torch.onnx.export(
                 traced,
                 (),
                 input_names=inputs,
                 output_names=outputs,
+                dynamic_shapes=shapes,
                 opset_version=OPSET,
                 custom_translation_table=_operators(),
                 dynamo=True,

@@ -12,7 +12,6 @@ import pytest
 
 import gso
 from gso import energy, io, linalg, tasks
-from gso.registry import Plugins
 from tests.conftest import saddle
 
 TERMS = """
@@ -153,8 +152,7 @@ def test_a_format(offered, tmp_path):
 
 def test_a_kind_and_a_task_of_nets(offered, tmp_path):
     pytest.importorskip("torch")
-    from gso.net import kind_of, load, predict, save
-    from gso.net.weights import make
+    from gso.net import kind_of, load, make, predict, save
 
     net = make({"kind": "lift", "task": "lift"})
     assert kind_of(net) == "lift"
@@ -220,4 +218,4 @@ def test_names_of_the_package_stay_its_own(tmp_path, monkeypatch):
     made(tmp_path, "clashing", {"task": "TASK = 3"}, "[gso.tasks]\nflatten = clashing.task:TASK\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     assert tasks.get("flatten").flat
-    assert Plugins("gso.tasks").names() == ["flatten"]
+    assert tasks._PLUGINS.names() == ["flatten"]

@@ -132,7 +132,12 @@ def predict(
     kind = tasks.get(task)
     if _is_mesh(surface):
         mesh = io.as_mesh(surface)
-        grid, patch = grid_of(mesh, kind)
+        try:
+            grid, patch = grid_of(mesh, kind)
+        except MeshError as error:
+            raise MeshError(
+                f"the mesh cannot be resampled to a grid for a net: {error}; use gso.tno.optimize"
+            ) from None
         done = predict(
             grid,
             task=task,
