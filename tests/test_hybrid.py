@@ -445,7 +445,7 @@ def test_a_net_of_another_task_is_refused():
 
 
 def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr("gso.hybrid.warm_start.find_spec", lambda name: None)
+    monkeypatch.setattr("gso.net.catalogue.find_spec", lambda name: None)
     cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "torch" in result.notes[-1]

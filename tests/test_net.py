@@ -299,7 +299,7 @@ def test_a_bad_surface_of_many_is_named(coarse):
         (np.zeros((3, 8, 3)), "too small"),
         (np.zeros((8, 8, 3)), "one point"),
         (np.full((8, 8, 3), np.nan), r"vertex \(0, 0\) is not finite"),
-        ("surface", "array of numbers"),
+        ("surface", "cannot read a file without a suffix"),
     ],
 )
 def test_bad_surfaces(points, says, coarse):
