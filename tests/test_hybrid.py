@@ -13,10 +13,10 @@ from gso import IsometryOptions as JointOptions
 from gso import MeshError, OptionError, WeightsError, hybrid, tno
 from gso.hierarchy import resample
 from gso.hybrid import net_saves_time, two_starts
-from gso.hybrid.patch import as_patch
 from gso.hybrid.time_model import expected as expected_times
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
+from gso.parametrization import as_patch
 from gso.pipeline import Run
 from gso.tno import Start
 from tests.conftest import cylinder, saddle, shuffled, sphere_cap
@@ -447,7 +447,7 @@ def test_a_net_of_another_task_is_refused():
 
 
 def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
-    monkeypatch.setattr("gso.hybrid.warm_start.find_spec", lambda name: None)
+    monkeypatch.setattr("gso.net.catalogue.find_spec", lambda name: None)
     cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "torch" in result.notes[-1]

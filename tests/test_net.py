@@ -300,7 +300,7 @@ def test_a_bad_surface_of_many_is_named(coarse):
         (np.zeros((3, 8, 3)), "too small"),
         (np.zeros((8, 8, 3)), "one point"),
         (np.full((8, 8, 3), np.nan), r"vertex \(0, 0\) is not finite"),
-        ("surface", "array of numbers"),
+        ("surface", "cannot read a file without a suffix"),
     ],
 )
 def test_bad_surfaces(points, says, coarse):
@@ -560,6 +560,69 @@ def test_neither_casadi_nor_the_solver_is_loaded():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def triangles(points):
+    """A grid of triangles, whose rows are no longer to be seen."""
+    order = np.random.default_rng(0).permutation(points.shape[0] * points.shape[1])
+    grid = gso.Mesh.from_grid(points)
+    place = np.argsort(order)
+    return gso.Mesh(grid.vertices[order], place[grid.triangles]), order
+
+
+class TestMeshes:
+    def test_a_grid_in_any_numbering(self, coarse):
+        points = saddle(20)
+        grid = gso.Mesh.from_grid(points)
+        order = np.random.default_rng(0).permutation(400)
+        mesh = gso.Mesh(grid.vertices[order], np.argsort(order)[grid.faces])
+        done = predict(mesh, model=coarse)
+        assert isinstance(done, gso.Mesh)
+        np.testing.assert_array_equal(done.faces, mesh.faces)
+        close(done.grid, predict(mesh.grid, model=coarse), done.vertices - mesh.vertices)
+
+    def test_what_as_mesh_takes(self, coarse, tmp_path):
+        mesh = gso.Mesh.from_grid(saddle(12))
+        gso.save(mesh, tmp_path / "saddle.obj")
+        expected = predict(mesh, model=coarse).vertices
+        for surface in (
+            (mesh.vertices, mesh.faces),
+            tmp_path / "saddle.obj",
+            str(tmp_path / "saddle.obj"),
+        ):
+            found = predict(surface, model=coarse)
+            np.testing.assert_allclose(found.vertices, expected, atol=1e-6)
+
+    def test_triangles_move_as_the_grid_does(self, coarse):
+        points = saddle(30)
+        mesh, order = triangles(points)
+        assert mesh.grid is None
+        moved = predict(mesh, model=coarse).vertices - mesh.vertices
+        # The map to a rectangle differs from the grid: so does the result, by a part of it.
+        expected = (predict(points, model=coarse) - points).reshape(-1, 3)[order]
+        assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(expected), rel=0.5)
+
+    def test_a_flat_image_lies_in_the_plane(self):
+        mesh, _ = triangles(cylinder(24))
+        flat = predict(mesh, task="flatten", model="flatten-strain")
+        assert isinstance(flat, gso.Mesh) and not flat.vertices[:, 2].any()
+        assert gso.metrics.area(flat) == pytest.approx(gso.metrics.area(mesh), rel=0.02)
+
+    def test_vertices_without_a_face_stay(self, coarse):
+        mesh, _ = triangles(saddle(20))
+        more = gso.Mesh(np.concatenate([mesh.vertices, [[9.0, 9, 9]]]), mesh.faces)
+        done = predict(more, model=coarse)
+        np.testing.assert_array_equal(done.vertices[-1], [9.0, 9, 9])
+        np.testing.assert_allclose(
+            done.vertices[:-1], predict(mesh, model=coarse).vertices, atol=1e-6
+        )
+
+    def test_meshes_that_are_no_disks(self, coarse):
+        corners = np.eye(4)[:, :3]
+        with pytest.raises(MeshError, match=r"cannot be resampled.*gso\.tno\.optimize"):
+            predict((corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]), model=coarse)
+        with pytest.raises(MeshError, match="take grids"):
+            predict(triangles(saddle(20))[0], task="denoise")
 
 
 def test_public_names():

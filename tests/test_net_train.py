@@ -81,6 +81,11 @@ def config(task="developable", model=None, **more):
     return from_dict({**given, "bf16": False, "ema": 0.5, **more})
 
 
+def loss_of(net, batch, phase, progress):
+    """The loss of a batch without its terms."""
+    return Objective(net)(batch, phase, progress)[0]
+
+
 def read_curves(folder):
     return [json.loads(line) for line in (folder / "curves.jsonl").read_text().splitlines()]
 
@@ -252,7 +257,7 @@ def test_every_term_of_a_configuration_is_a_loss():
     for name in terms:
         net = restless("flatten" if name.startswith("iso") else "developable")
         one, two = (
-            Objective(net)(Batch(designs, designs), Phase(weights={name: w}), 0.0) for w in (1, 2)
+            loss_of(net, Batch(designs, designs), Phase(weights={name: w}), 0.0) for w in (1, 2)
         )
         assert 0 < 2 * float(one) == pytest.approx(float(two), rel=1e-5)
 
@@ -299,7 +304,7 @@ def test_alignment_finds_turned_images():
     turn = torch.tensor([[0.6, 0.8], [0.8, -0.6]])
 
     def miss(target):
-        return float(Objective(net)(Batch(surface, target), Phase("label"), 0.5))
+        return float(loss_of(net, Batch(surface, target), Phase("label"), 0.5))
 
     assert miss(image @ turn + 3.0) == pytest.approx(miss(image), abs=1e-3)
     assert miss(image) < 0.5 < miss(other)
@@ -361,6 +366,60 @@ def test_bfloat16_spares_the_curvature(name):
         found.append(np.mean([net.kind.figures(*both)[net.kind.score] for both in results]))
     exact, rounded = found
     assert abs(rounded - exact) < 0.05 * exact
+
+
+@pytest.mark.parametrize(
+    ("made", "expected"),
+    [
+        (config(steps=20), {"curvature", "fairness", "proximity", "elongation"}),
+        (config("flatten", steps=20), {"strain", "edges"}),
+        (replace(RUNS["denoise"], steps=20), {"distance", "angle"}),
+        (
+            config(steps=20, phase=[{"batch": 4, "weights": {"in": 1, "gc": 2.0}}]),
+            {"in", "gc"},
+        ),
+    ],
+)
+def test_curves_show_every_term_of_the_loss(made, expected, folder, tmp_path):
+    train(made, folder, tmp_path)
+    (row,) = [r for r in read_curves(tmp_path) if "loss" in r]
+    terms = {name.removeprefix("loss/"): v for name, v in row.items() if name.startswith("loss/")}
+    assert terms.keys() == expected
+    assert sum(terms.values()) == pytest.approx(row["loss"], rel=1e-4)
+    assert row["skipped"] == 0
+
+
+def test_steps_whose_gradient_is_not_finite_are_skipped_and_counted(folder, tmp_path, monkeypatch):
+    real = Objective.forward
+
+    def spoilt(self, batch, phase, progress):
+        loss, terms = real(self, batch, phase, progress)
+        return (loss * math.nan if batch.step % 4 == 3 else loss), terms
+
+    monkeypatch.setattr(Objective, "forward", spoilt)
+    card = train(config(steps=20), folder, tmp_path)
+    (row,) = [r for r in read_curves(tmp_path) if "loss" in r]
+    assert row["skipped"] == card["skipped"] == 5
+    assert np.isfinite(row["loss"])
+    assert all(v.isfinite().all() for v in tensors(tmp_path / "model.safetensors").values())
+
+
+def test_the_best_net_by_validation_is_kept_beside_the_last(folder, tmp_path, monkeypatch):
+    scores = iter([3.0, 1.0, 2.0, math.nan, 4.0])
+    monkeypatch.setattr(
+        "gso.net.training.training_run.mean_figures", lambda *_: {"score": next(scores)}
+    )
+    train(config(steps=4, validate_every=0.0, checkpoint_every=0.0), folder, tmp_path)
+    best, last = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("best", "model"))
+    assert (best["checkpoint"], last["checkpoint"]) == ("best", "last")
+    assert best["steps"] == 2 and last["steps"] == 4
+    assert best["validation"] == {"score": 1.0}
+    assert best["best"] == last["best"] == {"steps": 2, "score": 1.0}
+    assert load(tmp_path / "best.safetensors").task == "developable"
+    # A run that goes on remembers its best net.
+    scores = iter([1.5])
+    train(config(steps=4, validate_every=0.0), folder, tmp_path)
+    assert json.loads((tmp_path / "best.json").read_text()) == best
 
 
 def test_loss_falls(folder, tmp_path):
@@ -515,7 +574,7 @@ def test_a_step_stays_on_the_device_of_its_batch(name, monkeypatch):
         surface = torch.empty(2, 64, 64, 3, device=meta)
         target = torch.empty(2, 64, 64, 2 if made.task == "flatten" else 3, device=meta)
         sigma = torch.empty(2, device=meta) if made.task == "denoise" else None
-        loss = objective(Batch(surface, target, sigma, step=3), phase, 0.5)
+        loss, _ = objective(Batch(surface, target, sigma, step=3), phase, 0.5)
         loss.backward()
         assert loss.device == meta
 
@@ -573,7 +632,7 @@ def test_results_stay_close_to_what_surfaces_were(folder, tmp_path):
     assert torch.equal(*(x.sort(dim=1).values for x in moved))
     for loss in (phase, Phase("energy")):
         alone = replace(batch, design=None)
-        assert Objective(run.net)(alone, loss, 0.5) != Objective(run.net)(batch, loss, 0.5)
+        assert loss_of(run.net, alone, loss, 0.5) != loss_of(run.net, batch, loss, 0.5)
     for name, seen, designs in (
         ("train", run.source.surfaces, run.source.designs),
         ("validation", *run.check[:2]),
@@ -601,11 +660,11 @@ def test_labels_are_what_a_teacher_makes_of_what_the_net_sees(folder, tmp_path):
     for phase in made.phases:
         batch = run.source.batch(made, phase, 0)
         assert batch.target is not None and batch.design is not None
-        assert Objective(load(net))(batch, phase, 0.5).isfinite()
+        assert loss_of(load(net), batch, phase, 0.5).isfinite()
     # The teacher has learnt what it teaches; symmetries would tell its grids apart.
     batch = run.source.batch(replace(made, augment="none"), made.phases[0], 0)
-    assert Objective(load(net))(batch, made.phases[0], 0.5) < 1e-3
-    assert Objective(run.net)(batch, made.phases[0], 0.5) > 0.5
+    assert loss_of(load(net), batch, made.phases[0], 0.5) < 1e-3
+    assert loss_of(run.net, batch, made.phases[0], 0.5) > 0.5
     save(GSONet("flatten", channels=4, blocks=1), tmp_path / "flat.safetensors")
     flat = str(tmp_path / "flat.safetensors")
     for wrong in ({"teacher": flat}, {"through": flat}):
@@ -623,7 +682,7 @@ def test_a_teacher_labels_fresh_surfaces_for_every_stride(folder, tmp_path):
     for phase in made.phases:
         batch = run.source.batch(made, phase, 0)
         assert batch.target.shape == (*batch.surface.shape[:3], 2)
-        assert Objective(run.net)(batch, phase, 0.5).isfinite()
+        assert loss_of(run.net, batch, phase, 0.5).isfinite()
 
 
 def launch(folder, out, path, processes=0):

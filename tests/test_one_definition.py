@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gso import Mesh, energy, geometry, metrics, parametrization
-from gso.hybrid import patch
 from gso.mesh import vertex_normals
+from gso.parametrization import patch
 from tests.conftest import saddle
 
 congruence, curvature, fairness, stretch = map(

@@ -123,7 +123,7 @@ class Job:
                 )
             io.check_spline(out, self.unit)
         else:
-            io.check_writable(out, io.SUFFIXES)
+            io.check_writable(out, io.suffixes())
         if plot is not None:
             from gso import plot as pictures
 

@@ -39,6 +39,7 @@ _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 @click.option("--init", metavar="NET", help="Net to begin with.")
 @click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")
 @click.option("--teacher", metavar="NET", help="Net whose results are the labels.")
+@click.option("--validate-every", metavar="SECONDS", type=float, help="Time between validations.")
 @click.option("--device", metavar="NAME", help="cpu, cuda ...; the GPU when there is one.")
 @shared.quiet
 def train(

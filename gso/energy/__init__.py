@@ -12,7 +12,7 @@ from types import ModuleType
 from gso.energy.base import Limit, Term, Weighted, mean_weights
 from gso.energy.losses import Absolute, Distance, Loss, Squared
 from gso.energy.multipliers import STIFF, hardened
-from gso.registry import Registry
+from gso.registry import Plugins, Registry, lacks
 
 __all__ = [
     "STIFF",
@@ -29,12 +29,12 @@ __all__ = [
     "registry",
 ]
 
-_MODULES = Registry(__name__, __path__)
+_MODULES = Registry(__name__, __path__, plugins=Plugins("gso.terms", lacks("residual", "build")))
 #: Register a term module from outside the package: ``add(name, module)``.
 add = _MODULES.add
 
 
 def registry() -> dict[str, ModuleType]:
     """Return every term module by name."""
-    found = {name: _MODULES.get(name) for name in _MODULES.names()}
+    found = _MODULES.modules()
     return {name: module for name, module in found.items() if hasattr(module, "residual")}

@@ -28,6 +28,14 @@ from gso.geometry.closing import Closing, closing
 from gso.geometry.depth_buffer import in_front, nearest_triangles, roomiest_pixels
 from gso.geometry.differences import second_difference
 from gso.geometry.gauss_image import image_curvature, solid_angle
+from gso.geometry.grid_frame import (
+    GridFrame,
+    at_vertices,
+    cell_corners,
+    grid_slope,
+    split_normals,
+    unit,
+)
 from gso.geometry.parametric import smooth_gaussian_curvature
 from gso.geometry.rigid import closest_motion
 from gso.geometry.shape_operator import (
@@ -55,11 +63,14 @@ from gso.geometry.vector import angle, cross, dot, norm, norm2, sub
 __all__ = [
     "GRID_RINGS",
     "Closing",
+    "GridFrame",
     "Matrix",
     "angle",
     "area_vectors",
+    "at_vertices",
     "ball",
     "box_diagonal",
+    "cell_corners",
     "chain_turns",
     "closest_motion",
     "closing",
@@ -78,6 +89,7 @@ __all__ = [
     "first_form",
     "gaussian_curvature",
     "grid_curvature",
+    "grid_slope",
     "grid_star",
     "half_trace",
     "image_curvature",
@@ -98,9 +110,11 @@ __all__ = [
     "singular_values",
     "smooth_gaussian_curvature",
     "solid_angle",
+    "split_normals",
     "star_area",
     "sub",
     "tangent_frame",
     "turn_and_shear",
+    "unit",
     "unit_rectangle",
 ]

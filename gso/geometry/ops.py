@@ -1,4 +1,4 @@
-"""Square root, atan2, minimum, maximum, where and stack for NumPy, torch and CasADi numbers.
+"""Square root, atan2, minimum, maximum, where, stack ... for NumPy, torch and CasADi numbers.
 
 The module is found from the type of the argument, so neither torch nor casadi is imported
 here: a caller with such a number has imported its package already.
@@ -106,3 +106,23 @@ def stack(arrays: Sequence[B]) -> B:
     """Stack NumPy arrays or torch tensors of one shape along a new first axis."""
     stacked: B = _module_of(arrays[0]).stack(tuple(arrays))
     return stacked
+
+
+def concatenate(arrays: Sequence[B], axis: int) -> B:
+    """Join NumPy arrays or torch tensors along an axis."""
+    mod = _module_of(arrays[0])
+    joined: B = mod.concatenate(arrays, axis) if mod is np else mod.cat(tuple(arrays), dim=axis)
+    return joined
+
+
+def padded(x: B, top: int, bottom: int, left: int, right: int) -> B:
+    """Add rows and columns of zeros to a NumPy array or torch tensor (..., H, W)."""
+    mod = _module_of(x)
+    number: Any = x
+    if mod is np:
+        none = [(0, 0)] * (number.ndim - 2)
+        larger: Any = np.pad(number, [*none, (top, bottom), (left, right)])
+    else:
+        larger = mod.nn.functional.pad(number, (left, right, top, bottom))
+    added: B = larger
+    return added

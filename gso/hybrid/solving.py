@@ -21,10 +21,10 @@ from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
 from gso.hybrid import two_starts
 from gso.hybrid.time_model import net_saves_time
-from gso.hybrid.warm_start import SIZE, Prediction, predictions
+from gso.hybrid.warm_start import Prediction, predictions
 from gso.io import as_mesh
 from gso.mesh import Mesh
-from gso.net.catalogue import NetLike
+from gso.net.catalogue import SIZE, NetLike
 from gso.pattern import Pattern
 from gso.pipeline import component_solves
 from gso.pipeline.case import Case
@@ -105,7 +105,7 @@ def solve(
         start is corrected for longer: the result has less energy than that of a cold solve.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
-        `max_deviation`, `max_strain`, `target_curvature`, `unit`, `callback`, `verdict`.
+        `max_deviation`, `max_strain`, `target_curvature`, `unit`, `callback`, `terms`, `verdict`.
 
     Returns
     -------
@@ -291,7 +291,7 @@ def _checked(task: str, polish: bool | int, keywords: Keywords) -> bool | int:
     signature(optimize).bind(None, **keywords)
     if "x0" in keywords:
         raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
-    names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature")
+    names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature", "terms")
     check(task, **{name: keywords[name] for name in names if name in keywords})
     polish = bool(polish) if isinstance(polish, bool | np.bool_) else int(polish)
     for name in ("max_strain", "target_curvature"):
@@ -358,8 +358,7 @@ def _start(
     keywords: Keywords,
 ) -> Start:
     """Return the start that a net's result makes."""
-    request = check(task, **{k: v for k, v in keywords.items() if k in ("formulation", "options")})
-    options = request.options
+    options = check(task, keywords.get("formulation"), keywords.get("options")).options
     limits = ("max_deviation", "max_strain", "target_curvature")
     bound = keywords["constraints"] or any(keywords.get(name) is not None for name in limits)
     plain = isinstance(options, DevelopableOptions) and options.variables in ("normal", "free")
@@ -372,7 +371,8 @@ def _start(
     start = Start(points, "net", guarded=True, remaining=left, resolution=SIZE)
     large = max(design.grid_shape) >= _TWO_STARTS[effort >= 1.0] * SIZE
     if large and isinstance(options, DevelopableOptions):
-        solve = partial(optimize, task=task, formulation=request.formulation)
+        more = {k: v for k, v in keywords.items() if k in ("formulation", "terms")}
+        solve = partial(optimize, task=task, **more)
         better = two_starts.refined(design, points, SIZE, options, solve)
         if better is not None:
             return replace(better, guarded=True, remaining=left)

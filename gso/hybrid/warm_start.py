@@ -5,21 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 
 from gso import metrics
 from gso.dataset.screen import CURVED
 from gso.errors import MeshError
-from gso.hybrid.patch import Patch, as_patch
 from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import NetLike, available, chain
+from gso.net.catalogue import NetLike, available, chain, missing_packages
+from gso.net.inference.mesh_grid import at_vertices, grid_of
+from gso.parametrization import Patch
 from gso.typing import Array
 
-#: Vertices along each side of the grids that nets see.
-SIZE = 64
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
 _SMALLEST = 8
 
@@ -75,7 +74,7 @@ def predictions(
     WeightsError
         The net that is named does not exist, or its file is damaged.
     """
-    if net is not None and not hasattr(net, "task") and task in tasks.names():
+    if isinstance(net, str | Path) and task in tasks.names():
         chain(net, task)
     why = _missing(task, net, alone)
     if why:
@@ -103,7 +102,9 @@ def predictions(
         for (k, grid, patch), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
             refused = values if isinstance(values, str) else ""
-            points = None if isinstance(values, str) else _back(designs[k], grid, patch, values)
+            points = (
+                None if isinstance(values, str) else at_vertices(designs[k], grid, patch, values)
+            )
             seconds = spent[k] + share + time.perf_counter() - clock
             found[k] = Prediction(points, seconds, name, refused)
     return found
@@ -113,8 +114,8 @@ def _missing(task: str, net: NetLike | None, alone: bool) -> str:
     """Say why no net can be used, whatever the design; empty if one can."""
     if task not in tasks.names() or not (alone or tasks.get(task).warm_start):
         return f"no net makes a start for task {task!r}"
-    if find_spec("torch") is None or find_spec("safetensors") is None:
-        return 'nets need torch and safetensors: pip install ".[net]" in the folder of gso'
+    if why := missing_packages(net):
+        return why
     if net is None and tasks.get(task).default not in available(task):
         return f"no net for task {task!r} comes with this version"
     return ""
@@ -138,14 +139,11 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
         if min(design.grid.shape[:2]) < _SMALLEST:
             height, width = design.grid.shape[:2]
             raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
-        return design.grid, None
-    if tasks.get(task).noisy:
-        raise MeshError("denoising nets take grids, and this mesh is none")
+        return grid_of(design, tasks.get(task))
     count = int(design.used.sum())
-    if count < _SMALLEST**2:
+    if count < _SMALLEST**2 and not tasks.get(task).noisy:
         raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")
-    patch = as_patch(design, SIZE)
-    return patch.grid, patch
+    return grid_of(design, tasks.get(task))
 
 
 def _check_curvature(grid: Array) -> None:
@@ -170,19 +168,3 @@ def _predicted(
         if len(grids) == 1:
             return [str(error)]
         return [_predicted(grid[None], task, net, passes)[0] for grid in grids]
-
-
-def _back(design: Mesh, grid: Array, patch: Patch | None, values: Array) -> Array:
-    """Return a net's result at the design's vertices.
-
-    Vertices without a face keep their positions, or are at the origin of a flat image.
-    """
-    surface = values.shape[-1] == 3
-    points = design.vertices.copy() if surface else np.zeros((len(design.vertices), 2))
-    if patch is None:
-        points[design.grid_index] = values
-    elif surface:
-        points[patch.vertices] += patch.at_vertices(values - grid)
-    else:
-        points[patch.vertices] = patch.at_vertices(values)
-    return points

@@ -39,6 +39,7 @@ from gso.io.raw_surface import Surface, welded
 from gso.io.raw_surface import checked as checked_weld
 from gso.io.source import read_bytes
 from gso.mesh import Mesh
+from gso.registry import Plugins, lacks
 from gso.typing import AnyPath, Array, MeshLike, Unwelded
 
 __all__ = [
@@ -67,6 +68,7 @@ __all__ = [
     "save_solids",
     "save_spline",
     "suffix_of",
+    "suffixes",
     "welded",
     "write",
 ]
@@ -85,7 +87,30 @@ _FORMATS: dict[str, _Format] = {
     ".npz": (arrays.read_npz, arrays.write_npz),
 }
 SUFFIXES = tuple(_FORMATS)
-"""Suffixes of the mesh files that are read and written."""
+"""Suffixes of the mesh files that the package itself reads and writes."""
+#: Formats of installed packages; their names are the suffixes, without the dot.
+_PLUGINS = Plugins("gso.formats", lacks("read", "write"))
+
+
+def suffixes() -> tuple[str, ...]:
+    """Return the suffixes of the mesh files that are read and written, also by plug-ins.
+
+    >>> suffixes()[:2]
+    ('.obj', '.ply')
+    """
+    more = (f".{name.lower()}" for name in _PLUGINS.names())
+    return tuple(dict.fromkeys((*_FORMATS, *more)))
+
+
+def _format(suffix: str) -> _Format:
+    """Return the reader and writer of a suffix, one of :func:`suffixes`."""
+    if suffix in _FORMATS:
+        return _FORMATS[suffix]
+    name = next(n for n in _PLUGINS.names() if n.lower() == suffix[1:])
+    module = _PLUGINS.get(name)
+    if module is None:
+        raise MeshError(f"the package for {suffix!r} files cannot be used; see the warnings")
+    return module.read, module.write
 
 
 def add_format(suffix: str, module: ModuleType) -> None:
@@ -104,7 +129,7 @@ def add_format(suffix: str, module: ModuleType) -> None:
     OptionError
         The suffix is taken, or does not begin with a dot.
     """
-    if not suffix.startswith(".") or suffix.lower() in _FORMATS:
+    if not suffix.startswith(".") or suffix.lower() in suffixes():
         raise OptionError(f"{suffix!r} is taken or is no suffix; give a new one such as '.msh'")
     _FORMATS[suffix.lower()] = (module.read, module.write)
 
@@ -189,14 +214,14 @@ def _read(path: AnyPath, made: Callable[[Surface], _Made], chord: float | None =
     if chord is not None and suffix not in SPLINE_SUFFIXES:
         raise OptionError(f"{name} is no CAD file, and has triangles already; leave out chord")
     try:
-        readable = (*_FORMATS, *SPLINE_SUFFIXES)
+        readable = (*suffixes(), *SPLINE_SUFFIXES)
         if suffix not in readable and not os.path.isdir(name):
             what = f"a {suffix!r} file" if suffix else "a file without a suffix"
             raise MeshError(f"cannot read {what}; use {', '.join(readable)}")
         data = read_bytes(name)
         if suffix in SPLINE_SUFFIXES:
             return made(read_faces(data, suffix, chord))
-        return made(_FORMATS[suffix][0](data))
+        return made(_format(suffix)[0](data))
     except MeshError as error:
         kind = NonManifoldError if isinstance(error, NonManifoldError) else MeshError
         raise kind(f"{name}: {error}") from error.__cause__
@@ -236,10 +261,10 @@ def save(mesh: MeshLike, path: AnyPath) -> None:
 
 def write(mesh: MeshLike, path: AnyPath) -> tuple[str, ...]:
     """Write a mesh as :func:`save` does, and return its warnings instead of issuing them."""
-    check_writable(path, tuple(_FORMATS))
+    check_writable(path, suffixes())
     name = os.fsdecode(path)
     surface = as_mesh(mesh)
-    write_surface = _FORMATS[suffix_of(name)][1]
+    write_surface = _format(suffix_of(name))[1]
     with replacing(path) as file:
         try:
             write_surface(surface, file)

@@ -12,19 +12,24 @@ from types import ModuleType
 from gso.errors import BackendError, OptionError
 from gso.linalg.base import Pattern, SingularError, Solver, blas_threads
 from gso.linalg.spd import spd
-from gso.registry import Registry
+from gso.registry import Plugins, Registry, lacks
 from gso.spelling import choices
 
 __all__ = ["Pattern", "SingularError", "add", "backends", "blas_threads", "choose", "find", "spd"]
 
-_MODULES = Registry(__name__, __path__, ("base", "spd"))
+_MODULES = Registry(
+    __name__,
+    __path__,
+    ("base", "spd"),
+    Plugins("gso.backends", lacks("available", "cost", "Solver")),
+)
 #: Register a backend module from outside the package: ``add(name, module)``.
 add = _MODULES.add
 
 
 def backends() -> dict[str, ModuleType]:
     """Every backend module by name, installed or not."""
-    return {name: _MODULES.get(name) for name in _MODULES.names()}
+    return _MODULES.modules()
 
 
 def find(name: str) -> ModuleType:
@@ -35,12 +40,12 @@ def find(name: str) -> ModuleType:
     OptionError, BackendError
         There is no such backend; it needs a package that is not installed.
     """
-    found = backends()
-    if name not in found:
-        raise OptionError(f"no linear backend {name!r}; {choices(name, sorted(found))}")
-    if not found[name].available():
-        raise BackendError(f"backend {name!r} needs a package: pip install {found[name].PACKAGE}")
-    return found[name]
+    if name not in _MODULES.names():
+        raise OptionError(f"no linear backend {name!r}; {choices(name, _MODULES.names())}")
+    backend = _MODULES.get(name)
+    if not backend.available():
+        raise BackendError(f"backend {name!r} needs a package: pip install {backend.PACKAGE}")
+    return backend
 
 
 def choose(pattern: Pattern, name: str | None = None) -> Solver:

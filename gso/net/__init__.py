@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from gso.net.inference.prediction import predict
     from gso.net.models.coarse import CoarseNet
     from gso.net.models.gsonet import GSONet
+    from gso.net.onnx_file import export
     from gso.net.tasks import add_task
     from gso.net.training.loop import train
     from gso.net.training.shipped_nets import train_all
@@ -25,6 +26,7 @@ __all__ = [
     "add_kind",
     "add_task",
     "available",
+    "export",
     "import_weights",
     "kind_of",
     "load",
@@ -43,6 +45,7 @@ __getattr__, __dir__ = at_first_use(
     {
         "catalogue": "CHAINS available located read_card",
         "foreign_weights": "import_weights",
+        "onnx_file": "export",
         "inference.prediction": "predict",
         "models.coarse": "CoarseNet",
         "models.gsonet": "GSONet",

@@ -14,17 +14,30 @@ from safetensors.torch import save as packed
 from gso.errors import GSOError, OptionError, WeightsError
 from gso.io.atomic import write_bytes
 from gso.io.json_file import write_json
-from gso.net.catalogue import FORMAT, located, read_card
-from gso.net.models.base import Net
+from gso.net.catalogue import FORMAT, card_of, exported, located, modified, verified
+from gso.net.models.base import Net, device_of
 from gso.net.models.coarse import CoarseNet
 from gso.net.models.gsonet import GSONet
+from gso.registry import Plugins
 from gso.spelling import choices
 from gso.typing import AnyPath, Json
 
 #: Kinds of nets, as cards and configurations name them; :func:`add_kind` adds to them.
 KINDS: dict[str, type[Net]] = {"coarse": CoarseNet, "gsonet": GSONet}
-#: Size limit of files in bytes, far above that of any net of this package.
-_LARGEST = 1 << 30
+
+
+def _no_net(found: object) -> str:
+    is_net = isinstance(found, type) and issubclass(found, Net)
+    return "" if is_net else "it is no subclass of gso.net.models.Net"
+
+
+#: Kinds of nets of installed packages.
+_PLUGINS = Plugins("gso.net.kinds", _no_net)
+
+
+def _kinds() -> dict[str, type[Net]]:
+    """Return all kinds, those of installed packages among them."""
+    return {**dict(_PLUGINS.items()), **KINDS}
 
 
 def add_kind(name: str, cls: type[Net]) -> None:
@@ -43,7 +56,7 @@ def add_kind(name: str, cls: type[Net]) -> None:
     OptionError
         The name is taken, or `cls` is not a subclass of Net.
     """
-    if name in KINDS:
+    if name in KINDS or name in _PLUGINS.names():
         raise OptionError(f"{name!r} is taken among the kinds of nets; choose another name")
     if not (isinstance(cls, type) and issubclass(cls, Net)):
         raise OptionError(f"{cls!r} is not a subclass of gso.net.models.base.Net")
@@ -65,17 +78,20 @@ def make(settings: Json) -> Net:
     """
     rest = dict(settings)
     kind = rest.pop("kind", None)
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise OptionError(f"no kind {kind!r} of net; {choices(kind, KINDS)}")
+    cls = KINDS.get(kind) or _PLUGINS.get(kind) if isinstance(kind, str) else None
+    if cls is None:
+        known = [*KINDS, *_PLUGINS.names()]
+        raise OptionError(f"no kind {kind!r} of net; {choices(kind, known)}")
     try:
-        return KINDS[kind](**rest)
+        made: Net = cls(**rest)
+        return made
     except (TypeError, ValueError, AttributeError) as error:
         raise OptionError(f"settings of the net: {error}") from None
 
 
 def kind_of(net: Net) -> str:
     """Return the kind of a net, as cards name it."""
-    return next(name for name, cls in KINDS.items() if type(net) is cls)
+    return next(name for name, cls in _kinds().items() if type(net) is cls)
 
 
 def save(
@@ -114,40 +130,54 @@ def save(
     }
     target = Path(path)
     write_bytes(target, data)
-    write_json(target.with_suffix(".json"), record)
+    write_json(card_of(target), record)
     return record
 
 
-def load(model: AnyPath, *, device: str | torch.device = "cpu") -> Net:
-    """Load a net in evaluation mode; no code in the files is executed.
+def load(model: AnyPath, device: str | torch.device | None = None) -> Net:
+    """Load a net with its weights, an ``nn.Module`` in evaluation mode.
+
+    No code in the files is executed.
 
     Parameters
     ----------
     model : str or path
-        Name of a net that comes with the package (see :func:`available`), or a
+        Name of a net that comes with the package (see :func:`gso.net.available`), or a
         .safetensors file with its card beside it.
-    device : str or torch.device
-        Device of the net.
+    device : str or torch.device, optional
+        Device of the net: "cpu", "cuda" ...; by default the GPU if there is one.
+
+    Returns
+    -------
+    Net
+        It maps grids (B, H, W, 3) of the unit ball, in single precision, to results
+        (B, H, W, 3), or to flat images (B, H, W, 2). :func:`gso.net.predict` applies it to
+        surfaces of any size and position.
 
     Raises
     ------
+    OptionError
+        There is no such device.
     WeightsError
         The file or its card is missing or damaged, they do not belong together, or the file
         does not hold the net that the card describes.
+
+    Examples
+    --------
+    >>> net = load("developable", device="cpu")
+    >>> net.task, net.training, isinstance(net, torch.nn.Module)
+    ('developable', False, True)
     """
     path = located(model)
-    card = read_card(path)
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST:
-            raise WeightsError(f"{path} has {size} bytes: no net of this package")
-        data = path.read_bytes()
-    except OSError as error:
-        raise WeightsError(f"{path} cannot be read: {error.strerror}") from None
-    if hashlib.sha256(data).hexdigest() != card["sha256"]:
-        raise WeightsError(f"{path} is damaged: it is not the file that its card describes")
+    if exported(path):
+        raise WeightsError(
+            f"{path} is an exported net, without weights to load; "
+            "give it to gso.net.predict, or load the .safetensors file"
+        )
+    where = device if isinstance(device, torch.device) else device_of(device)
+    card, data = verified(path)
     net = _filled(card["model"], data, path)
-    return placed(net, device).eval()
+    return placed(net, where).eval()
 
 
 def placed(net: Net, device: str | torch.device) -> Net:
@@ -176,11 +206,7 @@ def _filled(settings: Json, data: bytes, path: Path) -> Net:
 
 def cached(path: Path, device: torch.device) -> Net:
     """Load a net with :func:`load`, and cache it by path, device and modification time."""
-    try:
-        stamp = path.stat().st_mtime_ns
-    except OSError:
-        stamp = 0
-    return _cached(path, device, stamp)
+    return _cached(path, device, modified(path))
 
 
 @lru_cache(maxsize=8)

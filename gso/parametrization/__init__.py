@@ -1,4 +1,4 @@
-"""Initial plane images of a surface, and the placement of the final image."""
+"""Plane images of a surface: initial ones, their placement, and grids over a rectangle."""
 
 from gso.parametrization.alignment import align, settle
 from gso.parametrization.arap import Relaxed, relax, strain_level
@@ -9,15 +9,18 @@ from gso.parametrization.low_strain import low_strain
 from gso.parametrization.opening import Opened, by_rows, opened
 from gso.parametrization.orientation import SAFETY, orientation
 from gso.parametrization.packing import beside, closest_motion, place, upright
+from gso.parametrization.patch import Patch, as_patch
 from gso.parametrization.rectangle import rectangle
 
 __all__ = [
     "SAFETY",
     "Around",
     "Opened",
+    "Patch",
     "Relaxed",
     "align",
     "around",
+    "as_patch",
     "begin",
     "beside",
     "by_rows",

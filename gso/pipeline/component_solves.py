@@ -102,6 +102,9 @@ def solve_components(
     origin = _origins(cases)
     chosen = sorted(set(origin))
     watch = None if callback is None else _Watch(callback, len(chosen))
+    if workers is None and whole.request.terms:
+        # The user's functions may not be sent to other processes.
+        workers = 0
     if workers is None:
         workers = _useful_workers([len(cases[k].design.vertices) for k in chosen])
     solved = _solve_in_workers(solve, cases, chosen, watch, workers) if workers > 0 else {}

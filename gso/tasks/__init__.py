@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from gso.errors import OptionError
 from gso.first_use import at_first_use
-from gso.registry import Registry
+from gso.registry import Plugins, Registry, lacks
 from gso.spelling import choices
 
 if TYPE_CHECKING:
@@ -48,18 +48,26 @@ __getattr__, __dir__ = at_first_use(
 _SUPPORT = "base constrained evaluation options per_component request stage_constraints start"
 _FILES = Registry(__name__, __path__, tuple(_SUPPORT.split()))
 _ADDED: dict[str, Task] = {}
+#: Tasks of installed packages.
+_PLUGINS = Plugins("gso.tasks", lacks("formulations", "metrics"))
 
 
 def names() -> list[str]:
     """List the names of the tasks."""
-    return sorted([*_FILES.names(), *_ADDED])
+    return sorted({*_FILES.names(), *_ADDED, *_PLUGINS.names()})
 
 
 def get(name: str) -> Task:
     """Return the task of a name."""
-    if name not in names():
+    if name in _ADDED:
+        return _ADDED[name]
+    found: Task | None
+    if name in _FILES.names():
+        found = _FILES.get(name).TASK
+    else:
+        found = _PLUGINS.get(name)
+    if found is None:
         raise OptionError(f"no task {name!r}; {choices(name, names())}")
-    found: Task = _ADDED[name] if name in _ADDED else _FILES.get(name).TASK
     return found
 
 

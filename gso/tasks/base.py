@@ -284,6 +284,8 @@ class Formulation(Generic[O]):
     before : callable, optional
         Returns the request, by another formulation, whose result a solve improves; None where it
         starts from something else.
+    terms : bool
+        Whether its plans add the user's own terms, :meth:`gso.tasks.request.Request.own_items`.
     """
 
     options: type[O]
@@ -292,6 +294,7 @@ class Formulation(Generic[O]):
     limits: tuple[str, ...] = ()
     search: Callable[[Runner, Request[O]], Solution] | None = None
     before: Callable[[Request[O]], Request[Any] | None] | None = None
+    terms: bool = False
 
 
 @dataclass(frozen=True)

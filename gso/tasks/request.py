@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from gso import linalg, tasks
+from gso.energy import Weighted
 from gso.errors import OptionError
+from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain
 from gso.tasks.options import Options
 from gso.tasks.start import Start
@@ -17,6 +20,8 @@ from gso.typing import Array, MeshLike
 #: The settings of a formulation.
 O = TypeVar("O", bound=Options, covariant=True)
 P = TypeVar("P", bound=Options)
+#: Builds weighted terms of the user's for a design, or for a coarser copy of it.
+OwnTerms = Callable[[Mesh], Iterable[Weighted]]
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,8 @@ class Request(Generic[O]):
         Largest displacement of a vertex, which searches set.
     weight_factor : float
         Factor on the weight of the task's main term (curvature, isometry), which searches vary.
+    terms : tuple of callable
+        Build the user's own terms, which join the objective of every stage.
     """
 
     task: str
@@ -100,6 +107,43 @@ class Request(Generic[O]):
     x0: Array | None = None
     max_displacement: float | None = None
     weight_factor: float = 1.0
+    terms: tuple[OwnTerms, ...] = ()
+
+    def own_items(self, mesh: Mesh, items: Iterable[Weighted]) -> list[Weighted]:
+        """Build the user's own terms for a mesh in the solver's frame.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            The design, a coarser copy of it, or one of its components, in the unit ball.
+        items : iterable of Weighted
+            The formulation's terms, whose names are taken.
+
+        Raises
+        ------
+        OptionError
+            What `terms` returns is no sequence of `gso.energy.Weighted`, or a name is taken.
+        """
+        if not self.terms:
+            return []
+        taken, found = {item.term.name for item in items}, []
+        for build in self.terms:
+            built = build(mesh)
+            if not isinstance(built, Iterable):
+                raise OptionError(
+                    f"terms: {build!r} returns {built!r}; it must return a list of "
+                    "gso.energy.Weighted"
+                )
+            for item in built:
+                if not isinstance(item, Weighted):
+                    raise OptionError(f"terms: {item!r} is no gso.energy.Weighted")
+                if item.term.name in taken:
+                    raise OptionError(
+                        f"terms: the name {item.term.name!r} is that of a term of the formulation; "
+                        "choose another one"
+                    )
+                found.append(item)
+        return found
 
     def in_frame(self, scale: float, x0: Array | None) -> Request[O]:
         """Return the request for a design in the unit ball.
@@ -129,6 +173,7 @@ def check(
     max_strain: Strain | None = None,
     target_curvature: float | None = None,
     x0: MeshLike | Start | None = None,
+    terms: Sequence[OwnTerms] = (),
     verdict: bool = True,
     diagonal: float = 1.0,
     unit: str = "mm",
@@ -176,5 +221,38 @@ def check(
                 f"{limit} takes many solves, which the iterations of a start would cut off; "
                 "leave one of them out"
             )
-    given = formulation is not None
-    return Request(task, name, settings, limits, start, given, verdict)
+    own = checked_terms(terms, f"formulation {name!r} of task {task!r}", takes=chosen.terms)
+    # Another formulation, which a search may try, would not have these terms.
+    given = formulation is not None or bool(own)
+    return Request(task, name, settings, limits, start, given, verdict, terms=own)
+
+
+def checked_terms(
+    terms: Sequence[OwnTerms], asked: str, *, takes: bool = False
+) -> tuple[OwnTerms, ...]:
+    """Return the builders of the user's terms as a tuple.
+
+    Parameters
+    ----------
+    terms : sequence of callable
+    asked : str
+        What is asked for, in words.
+    takes : bool
+        Whether it takes such terms.
+
+    Raises
+    ------
+    OptionError
+        It does not, or `terms` is no sequence of callables.
+    """
+    if callable(terms) or not isinstance(terms, Sequence) or not all(map(callable, terms)):
+        raise OptionError(f"terms is {terms!r}; it must be a list of callables")
+    if terms and not takes:
+        able = ", ".join(
+            f"{task!r} by {name!r}"
+            for task in tasks.names()
+            for name, one in tasks.get(task).formulations.items()
+            if one.terms
+        )
+        raise OptionError(f"{asked} takes no terms; these do: {able}")
+    return tuple(terms)

@@ -22,7 +22,7 @@ from gso.seams import joint_solve
 from gso.solver import Callback
 from gso.tasks import request as requests
 from gso.tasks.base import Options
-from gso.tasks.request import Request
+from gso.tasks.request import OwnTerms, Request, checked_terms
 from gso.tasks.start import Start
 from gso.typing import MeshLike
 
@@ -40,6 +40,7 @@ def optimize(
     unit: str = "mm",
     x0: MeshLike | Start | None = None,
     callback: Callback | None = None,
+    terms: Sequence[OwnTerms] = (),
     verdict: bool = True,
 ) -> Result:
     """Make a surface developable, flatten it, denoise it, bend it, or map it to the plane.
@@ -90,6 +91,11 @@ def optimize(
         Called with a :class:`gso.Progress` after each iteration; returning False stops
         the solve, and the best iterate so far is returned. Large meshes of several components
         are solved in worker processes: it is then called once for each finished component.
+    terms : sequence of callable
+        Terms of your own, which join the objective: each callable returns a list of
+        :class:`gso.energy.Weighted` for a :class:`gso.Mesh`. It is called for the design, and for
+        each coarser copy that is solved first; these meshes are in the unit ball, grids numbered
+        row by row. `developable` by "curvature", and `flatten`. See ``docs/extending.rst``.
     verdict : bool
         Judge the result (:mod:`gso.verdict`) and, for `developable`, flatten it to measure its
         strain. False skips both, to save time.
@@ -130,6 +136,7 @@ def optimize(
         max_strain=max_strain,
         target_curvature=target_curvature,
         x0=x0,
+        terms=terms,
         verdict=verdict,
         diagonal=design.diagonal,
         unit=unit,
@@ -149,6 +156,7 @@ def optimize(
         )
         result = lay_strips(mesh, wanted)
     elif isinstance(mesh, Pieces):
+        checked_terms(terms, "a design cut into pieces")
         if not isinstance(options, Options):
             request = request.with_options(settings.for_pieces())
         result = joint_solve.solve_pieces(mesh, request, constraints, callback)
@@ -170,6 +178,7 @@ def check(
     max_strain: Strain | None = None,
     target_curvature: float | None = None,
     x0: MeshLike | Start | None = None,
+    terms: Sequence[OwnTerms] = (),
     verdict: bool = True,
     diagonal: float = 1.0,
     unit: str = "mm",
@@ -181,6 +190,8 @@ def check(
     """
     strips = formulation == RULED or (formulation is None and isinstance(options, StripsOptions))
     strips &= task == "developable"
+    if strips:
+        checked_terms(terms, f"formulation {RULED!r} of task 'developable'")
     request = requests.check(
         task,
         None if strips else formulation,
@@ -189,6 +200,7 @@ def check(
         max_strain=max_strain,
         target_curvature=target_curvature,
         x0=x0,
+        terms=terms,
         verdict=verdict,
         diagonal=diagonal,
         unit=unit,

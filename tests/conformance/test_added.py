@@ -184,7 +184,7 @@ def test_a_task_and_a_kind_of_nets(lifted, tmp_path):
     optimiser = torch.optim.SGD(net.parameters(), 0.5)
     for _ in range(20):
         optimiser.zero_grad()
-        Objective(net)(Batch(surfaces), config.phases[0], 0.0).backward()
+        Objective(net)(Batch(surfaces), config.phases[0], 0.0)[0].backward()
         optimiser.step()
     gso.net.save(net, tmp_path / "lift.safetensors")
     design = surfaces[0].double().numpy()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.hierarchy import resample
-from gso.net.models.base import SIZE
+from gso.net.catalogue import SIZE
 from gso.smoothing import estimate_sigma, smooth_grid
 from gso.spline.fit import interpolated
 from gso.typing import Array

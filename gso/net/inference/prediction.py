@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, cast, overload
+
 import numpy as np
-import torch
 from numpy.typing import ArrayLike
 
-from gso.errors import MeshError, OptionError
+from gso import io
+from gso.errors import BackendError, MeshError, OptionError
 from gso.hierarchy import resample
+from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import NetLike, chain
+from gso.net.catalogue import SIZE, NetLike, chain, exported, missing_packages
 from gso.net.inference import denoising
-from gso.net.models.base import SIZE, Net, device_of, exact
-from gso.net.weights import cached
+from gso.net.inference.applied_net import AppliedNet
+from gso.net.inference.mesh_grid import at_vertices, grid_of
 from gso.quantities import as_positive
-from gso.typing import Array
+from gso.typing import AnyPath, Array, MeshLike, Polyhedron
+
+if TYPE_CHECKING:
+    from gso.net.models.base import Net
 
 #: Smallest side of a grid that is resampled to the size of the nets.
 SMALLEST = 4
@@ -22,8 +31,30 @@ SMALLEST = 4
 _BATCH = 64
 
 
+@overload
+def predict(
+    surface: Polyhedron | PathLike[str],
+    *,
+    task: str = ...,
+    model: NetLike | None = ...,
+    repeat: int = ...,
+    passes: int | None = ...,
+    sigma: float | None = ...,
+    device: str | None = ...,
+) -> Mesh: ...
+@overload
 def predict(
     surface: ArrayLike,
+    *,
+    task: str = ...,
+    model: NetLike | None = ...,
+    repeat: int = ...,
+    passes: int | None = ...,
+    sigma: float | None = ...,
+    device: str | None = ...,
+) -> Array: ...
+def predict(
+    surface: MeshLike | ArrayLike,
     *,
     task: str = "developable",
     model: NetLike | None = None,
@@ -31,7 +62,7 @@ def predict(
     passes: int | None = None,
     sigma: float | None = None,
     device: str | None = None,
-) -> Array:
+) -> Mesh | Array:
     """Make surfaces developable, flatten or denoise them with a net.
 
     Surfaces are normalised to the unit ball, and results are transformed back. The nets are
@@ -41,22 +72,30 @@ def predict(
     averaged to that size and the result is interpolated, without details between its
     vertices; smaller grids are extended beyond their border.
 
+    A mesh that is no grid, in one piece with a boundary and without handles, is resampled to
+    64 x 64 vertices (:func:`gso.parametrization.as_patch`), and the displacements are
+    interpolated at its vertices; not for "denoise".
+
     Parameters
     ----------
-    surface : array_like, (H, W, 3) or (B, H, W, 3)
+    surface : array_like, (H, W, 3) or (B, H, W, 3), or Mesh
         A grid or a batch of grids of one size, from 4 x 4 up (16 x 16 for "denoise"), in any
-        unit of length.
+        unit of length. Or a mesh, or what else :func:`gso.as_mesh` takes: (vertices, faces), a
+        trimesh.Trimesh, a path.
     task : {"developable", "flatten", "denoise"}
         What to do.
-    model : str, path or Net, optional
+    model : str, path, Net or sequence, optional
         Name of a net that comes with the package (:func:`gso.net.available`), a
-        .safetensors file, or a net; the task's default net by default.
+        .safetensors file, a .onnx file (:func:`gso.net.export`), which needs onnxruntime in
+        place of PyTorch, or a net; the task's default net by default. Several in a sequence
+        are applied one after the other.
     repeat : int
         How often the last net is applied, each time to its previous result, normalised anew.
         Not for "flatten".
     passes : int, optional
         Largest number of passes; all of a net's by default. The default nets correct their own
-        results in a few passes, and their time is proportional to the number.
+        results in a few passes, and their time is proportional to the number. An exported net
+        has the number that it was exported with.
     sigma : float, optional
         "denoise": standard deviation of the noise, in the unit of the input; by default it is
         estimated for each surface (:func:`gso.smoothing.estimate_sigma`). Nets without a noise
@@ -66,14 +105,17 @@ def predict(
 
     Returns
     -------
-    ndarray of float64
+    ndarray of float64, or Mesh
         Surfaces (..., H, W, 3) in the unit and position of the input, or flat images
-        (..., H, W, 2) for "flatten", in the unit of the input and centred at the origin.
+        (..., H, W, 2) for "flatten", in the unit of the input and centred at the origin. For a
+        mesh a mesh with the same faces; that of a flat image lies in the plane z = 0.
 
     Raises
     ------
+    BackendError
+        PyTorch is not installed, or onnxruntime for a .onnx file.
     MeshError
-        Grids are too small, not finite, or have no extent.
+        Grids are too small, not finite, or have no extent; a mesh cannot be resampled.
     OptionError
         An option is unknown or out of range.
     WeightsError
@@ -87,10 +129,29 @@ def predict(
     >>> predict(panel, task="flatten", model=CoarseNet("flatten")).shape
     (20, 30, 2)
     """
-    points = _checked(surface)
+    kind = tasks.get(task)
+    if _is_mesh(surface):
+        mesh = io.as_mesh(surface)
+        try:
+            grid, patch = grid_of(mesh, kind)
+        except MeshError as error:
+            raise MeshError(
+                f"the mesh cannot be resampled to a grid for a net: {error}; use gso.tno.optimize"
+            ) from None
+        done = predict(
+            grid,
+            task=task,
+            model=model,
+            repeat=repeat,
+            passes=passes,
+            sigma=sigma,
+            device=device,
+        )
+        found = at_vertices(mesh, grid, patch, done)
+        return mesh.replaced(np.pad(found, [(0, 0), (0, 3 - found.shape[1])]))
+    points = _checked(cast(ArrayLike, surface))
     batch = points[None] if points.ndim == 3 else points
-    kind, where = tasks.get(task), device_of(device)
-    nets = _nets(model, task, where)
+    nets = _nets(model, task, device)
     if isinstance(repeat, bool) or not isinstance(repeat, int) or not 1 <= repeat <= 100:
         raise OptionError(f"repeat is {repeat!r}; take a whole number from 1 to 100")
     if repeat > 1 and kind.flat:
@@ -103,20 +164,26 @@ def predict(
         as_positive(sigma, "sigma", zero=True)
     work = _denoised if kind.noisy else _predicted
     blocks = [
-        work(batch[k : k + _BATCH], nets, passes, sigma, where)
-        for k in range(0, len(batch), _BATCH)
+        work(batch[k : k + _BATCH], nets, passes, sigma) for k in range(0, len(batch), _BATCH)
     ]
     out = np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], kind.components))
     return out[0] if points.ndim == 3 else out
 
 
+def _is_mesh(surface: object) -> bool:
+    """Tell meshes, pairs (vertices, faces) and paths from arrays."""
+    if isinstance(surface, tuple | list):
+        return len(surface) == 2 and all(np.ndim(part) == 2 for part in surface)
+    return isinstance(surface, str | Path) or hasattr(surface, "faces")
+
+
 def _denoised(
-    batch: Array, nets: list[Net], passes: int | None, sigma: float | None, device: torch.device
+    batch: Array, nets: list[AppliedNet], passes: int | None, sigma: float | None
 ) -> Array:
     """Predict for noisy grids of any size, which :mod:`gso.net.inference.denoising` converts."""
     height, width = batch.shape[1:3]
     if (height, width) == (SIZE, SIZE):
-        return _predicted(batch, nets, passes, sigma, device)
+        return _predicted(batch, nets, passes, sigma)
     if min(height, width) < denoising.SMALLEST:
         least = denoising.SMALLEST
         raise MeshError(
@@ -127,48 +194,60 @@ def _denoised(
     noise: float | Array | None = None
     if sigma is not None:
         noise = sigma * denoising.share(height, width)
-    elif _told(nets[0]):
+    elif nets[0].told:
         noise = np.array([denoising.sigma(*pair) for pair in zip(batch, grids, strict=True)])
-    done = _predicted(grids, nets, passes, noise, device)
+    done = _predicted(grids, nets, passes, noise)
     return np.stack([denoising.back(grid, height, width) for grid in done])
 
 
 def _predicted(
-    batch: Array,
-    nets: list[Net],
-    passes: int | None,
-    sigma: float | Array | None,
-    device: torch.device,
+    batch: Array, nets: list[AppliedNet], passes: int | None, sigma: float | Array | None
 ) -> Array:
     out: Array = batch
     for net in nets:
         unit, centre, scale = _normalised(out)
         most = net.passes if passes is None else min(int(passes), net.passes)
-        noise = _sigma(net, unit, scale, sigma, device)
-        coarse = torch.as_tensor(_resampled(unit), dtype=torch.float32, device=device)
-        with torch.inference_mode(), exact():
-            if unit.shape[1:3] == (SIZE, SIZE):
-                moved = net.displacements(coarse, noise, passes=most)
-            else:
-                fine = torch.as_tensor(unit, dtype=torch.float32, device=device)
-                moved = net.displacements_at(coarse, fine, noise, passes=most)
-            start = net.initial_geometry(torch.as_tensor(unit))
-        out = scale * (start.numpy() + moved.double().cpu().numpy())
-        if net.kind.flat:
+        noise = _sigma(net, unit, scale, sigma)
+        moved = net.displacements(_resampled(unit), unit, noise, most)
+        out = scale * (net.start(unit) + moved)
+        if tasks.get(net.task).flat:
             return out
         out = out + centre
     return out
 
 
-def _nets(model: NetLike | None, task: str, device: torch.device) -> list[Net]:
-    if isinstance(model, Net):
-        nets = [model.to(device)]
-    else:
-        nets = [cached(path, device) for path in chain(model, task)]
+def _nets(model: NetLike | None, task: str, device: str | None) -> list[AppliedNet]:
+    """Make the nets ready that are applied one after the other."""
+    several = model if isinstance(model, list | tuple) else (model,)
+    if not several:
+        raise OptionError("model is an empty sequence; give at least one net")
+    if why := missing_packages(model):
+        raise BackendError(why)
+    nets = [net for one in several for net in _one_or_chain(one, task, device)]
     for net in nets:
         if net.task != task:
             raise OptionError(f"the net is for task {net.task!r}, not {task!r}")
     return nets
+
+
+def _one_or_chain(
+    model: AnyPath | Net | None, task: str, device: str | None
+) -> Sequence[AppliedNet]:
+    if model is not None and not isinstance(model, str | Path):
+        from gso.net.inference.torch_net import torch_net
+
+        return [torch_net(cast("Net", model), device)]
+    return [_of_file(path, device) for path in chain(model, task)]
+
+
+def _of_file(path: Path, device: str | None) -> AppliedNet:
+    if exported(path):
+        from gso.net.inference.onnx_net import onnx_net
+
+        return onnx_net(path, device)
+    from gso.net.inference.torch_net import torch_net
+
+    return torch_net(path, device)
 
 
 def _checked(surface: ArrayLike) -> Array:
@@ -214,19 +293,10 @@ def _resampled(unit: Array) -> Array:
     return np.stack([resample(grid, SIZE, SIZE) for grid in unit])
 
 
-def _told(net: Net) -> bool:
-    """Tell whether the noise level is an input of a net."""
-    return bool(getattr(net, "sigma", False))
-
-
-def _sigma(
-    net: Net, unit: Array, scale: Array, sigma: float | Array | None, device: torch.device
-) -> torch.Tensor | None:
+def _sigma(net: AppliedNet, unit: Array, scale: Array, sigma: float | Array | None) -> Array | None:
     """Return the noise (B,) of each surface in the unit ball, None if the net does not use it."""
-    if not _told(net):
+    if not net.told:
         return None
     if sigma is not None:
-        noise = sigma / scale.ravel()
-    else:
-        noise = np.array([denoising.sigma(grid, grid) for grid in unit])
-    return torch.as_tensor(noise, dtype=torch.float32, device=device)
+        return np.asarray(sigma / scale.ravel())
+    return np.array([denoising.sigma(grid, grid) for grid in unit])

@@ -13,9 +13,6 @@ from gso.net import tasks
 from gso.net.models.grid_geometry import planes, rectangle
 from gso.net.models.resampling import resampled
 
-#: Samples along each side at which nets are trained.
-SIZE = 64
-
 
 class Net(nn.Module):
     """A net that moves the points of grids (B, H, W, 3) of the unit ball.
@@ -39,6 +36,8 @@ class Net(nn.Module):
 
     passes = 1
     multiple = 1
+    #: Names of what :meth:`exported_outputs` returns.
+    EXPORTED_OUTPUTS: tuple[str, ...] = ("displacements",)
 
     def __init__(self, task: str, **settings: object):
         super().__init__()
@@ -78,6 +77,17 @@ class Net(nn.Module):
         """Compute displacements (B, h, w, d) of `fine`, the same surfaces at another resolution."""
         moved = self.displacements(surface, sigma, passes=passes)
         return resampled(moved, fine.shape[1], fine.shape[2])
+
+    def exported_outputs(
+        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+    ) -> tuple[Tensor, ...]:
+        """Compute what an exported net returns, as `EXPORTED_OUTPUTS` names it.
+
+        It is :meth:`displacements` and, if they are spline fields, the fields' coefficients
+        "coarse" and "fine" (B, d, n, m) in radii of the unit ball: components along the axes
+        of the flat image, or along normal, rows and columns of :class:`gso.geometry.GridFrame`.
+        """
+        return (self.displacements(surface, sigma, passes=passes),)
 
     def initial_geometry(self, surface: Tensor) -> Tensor:
         """Return what the net displaces: the surface, or for flat images a rectangle."""

@@ -10,7 +10,7 @@ from gso.errors import OptionError
 from gso.net.models import inputs
 from gso.net.models.base import Net
 from gso.net.models.blocks import Residual
-from gso.net.models.grid_geometry import Frame, planes
+from gso.net.models.grid_geometry import Frame, planes, points
 from gso.net.models.resampling import spline_field
 
 
@@ -109,7 +109,7 @@ class CoarseNet(Net):
         known = torch.stack([*inputs.shape(p, frame), *bent], dim=1)
         start = self.initial_geometry(surface)
         state = inputs.stretching(frame, planes(start)) if self.kind.flat else bent
-        moved = known.new_zeros(len(known), self.kind.components, *known.shape[2:])
+        moved = known.new_zeros(known.shape[0], self.kind.components, *known.shape[2:])
         coarse: Tensor | float = 0.0
         fine: Tensor | float = 0.0
         for _ in range(passes):
@@ -122,6 +122,16 @@ class CoarseNet(Net):
             else:
                 state = inputs.bending(image, Frame.of(image))
         return _joined(known, state, moved / self.unit), coarse, fine
+
+    EXPORTED_OUTPUTS = ("displacements", "coarse", "fine")
+
+    def exported_outputs(
+        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+    ) -> tuple[Tensor, ...]:
+        frame = Frame.of(planes(surface))
+        fields = self.coefficients(surface, frame, passes)
+        moved = self._vectors(self._shares(*fields, *surface.shape[1:3]), frame)
+        return (moved, *(self.unit * field for field in fields))
 
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
@@ -160,7 +170,7 @@ class CoarseNet(Net):
         return self.unit * both
 
     def _vectors(self, shares: Tensor, frame: Frame) -> Tensor:
-        return shares.movedim(1, -1) if self.kind.flat else frame.combine(shares)
+        return shares.movedim(1, -1) if self.kind.flat else points(frame.vectors(*shares.unbind(1)))
 
 
 def _joined(known: Tensor, state: list[Tensor], moved: Tensor) -> Tensor:

@@ -7,15 +7,16 @@ Internally, points are tuples of components ("planes") of shape (B, H, W), as
 from __future__ import annotations
 
 from operator import add
-from typing import NamedTuple
 
 import torch
 from torch import Tensor
 from torch.nn.functional import pad
 
 from gso import geometry
+from gso.geometry import GridFrame
 
 Planes = tuple[Tensor, ...]
+Frame = GridFrame[Tensor]
 
 #: Lower bound on lengths in denominators, far below the lengths of grids in the unit ball.
 _SHORTEST = 1e-12
@@ -74,12 +75,12 @@ def axes(grids: Tensor) -> Tensor:
         tuple(torch.einsum("bhwi,h->ib", grids, rows) / (height * width)),
         tuple(torch.einsum("bhwi,w->ib", grids, columns) / (height * width)),
     ]
-    along, across = (unit(slope) for slope in slopes)
+    along, across = (geometry.unit(slope) for slope in slopes)
     between = tuple(a + b for a, b in zip(along, across, strict=True))
     beside = geometry.sub(along, across)
     lengths = [geometry.norm(v) for v in (*slopes, between, beside)]
     least = torch.stack(lengths).amin(dim=0)
-    between, beside = unit(between), unit(beside)
+    between, beside = geometry.unit(between), geometry.unit(beside)
     x = tuple((a + b) * 0.5**0.5 for a, b in zip(between, beside, strict=True))
     y = tuple((a - b) * 0.5**0.5 for a, b in zip(between, beside, strict=True))
     found = torch.stack([points(v) for v in (x, y, geometry.cross(x, y))], dim=-1)
@@ -103,52 +104,15 @@ def to_border(inner: Tensor) -> Tensor:
     return pad(inner[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
 
 
-def unit(v: Planes) -> Planes:
-    """Normalise vectors to unit length; zero vectors stay zero."""
-    scale = 1.0 / geometry.norm(v).clamp_min(_SHORTEST)
-    return tuple(c * scale for c in v)
-
-
-def corners(p: Planes) -> tuple[Planes, Planes, Planes, Planes]:
-    """Return the corners (i, j), (i+1, j), (i+1, j+1), (i, j+1) of all cells."""
-    low, high = slice(None, -1), slice(1, None)
-    where = ((low, low), (high, low), (high, high), (low, high))
-    v0, v1, v2, v3 = (tuple(c[:, i, j] for c in p) for i, j in where)
-    return v0, v1, v2, v3
-
-
 def normals(p: Planes) -> Planes:
     """Compute area-weighted unit vertex normals as :func:`gso.unknowns.vertex_normals` does."""
-    v0, v1, v2, v3 = corners(p)
+    v0, v1, v2, v3 = geometry.cell_corners(p)
     whole = geometry.cross(geometry.sub(v2, v0), geometry.sub(v3, v1))
     at = [
         geometry.cross(geometry.sub(b, a), geometry.sub(c, a))
         for a, b, c in ((v0, v1, v3), (v1, v2, v0), (v2, v3, v1), (v3, v0, v2))
     ]
-    return unit(_gathered([tuple(map(add, whole, corner)) for corner in at]))
-
-
-def split_normals(p: Planes) -> Planes:
-    """Compute unit vertex normals of the published triangulation, for the nets' frames."""
-    v0, v1, v2, v3 = corners(p)
-    diagonal = geometry.sub(v2, v0)
-    lower = geometry.cross(geometry.sub(v1, v0), diagonal)
-    upper = geometry.cross(diagonal, geometry.sub(v3, v0))
-    whole = tuple(map(add, lower, upper))
-    return unit(_gathered([whole, lower, whole, upper]))
-
-
-def _gathered(at: list[Planes]) -> Planes:
-    """Sum the values at the four corners of the cells at each vertex."""
-    sides = ((0, 1, 0, 1), (0, 1, 1, 0), (1, 0, 1, 0), (1, 0, 0, 1))
-    placed = [[pad(c, side) for c in corner] for corner, side in zip(at, sides, strict=True)]
-    return tuple(a + b + c + d for a, b, c, d in zip(*placed, strict=True))
-
-
-def _slopes(x: Tensor, *axes: int) -> list[Tensor]:
-    """Compute first derivatives along axes, with the parameter range [0, 1]."""
-    spacing = [1.0 / (x.shape[axis] - 1) for axis in axes]
-    return list(torch.gradient(x, dim=axes, spacing=spacing))
+    return geometry.unit(geometry.at_vertices([tuple(map(add, whole, corner)) for corner in at]))
 
 
 def _bend(x: Tensor, axis: int) -> Tensor:
@@ -157,32 +121,6 @@ def _bend(x: Tensor, axis: int) -> Tensor:
     inner = torch.diff(x, n=2, dim=axis) * (n - 1) ** 2
     first, last = inner.narrow(axis, 0, 1), inner.narrow(axis, n - 3, 1)
     return torch.cat([first, inner, last], dim=axis)
-
-
-class Frame(NamedTuple):
-    """Derivatives of grids by their parameters in [0, 1]^2, and unit vectors at the vertices.
-
-    `along` and `across` are the unit tangents of the grid lines and `normal` is the unit
-    normal. They rotate with the surface, so that components along them are pose-invariant.
-    """
-
-    du: Planes
-    dv: Planes
-    along: Planes
-    across: Planes
-    normal: Planes
-
-    @classmethod
-    def of(cls, p: Planes) -> Frame:
-        """Compute the frame of grids."""
-        du, dv = (d.unbind() for d in _slopes(torch.stack(p), -2, -1))
-        return cls(du, dv, unit(du), unit(dv), split_normals(p))
-
-    def combine(self, shares: Tensor) -> Tensor:
-        """Compute vectors (B, H, W, 3) from components (B, 3, H, W) on normal, along, across."""
-        n, a, b = shares.unbind(1)
-        axes = zip(self.normal, self.along, self.across, strict=True)
-        return points(tuple(n * x + a * y + b * z for x, y, z in axes))
 
 
 def first_form(frame: Frame) -> Planes:
@@ -194,7 +132,7 @@ def first_form(frame: Frame) -> Planes:
 def normal_curvatures(p: Planes, frame: Frame) -> Tensor:
     """Compute the normal curvatures of both parameter lines, and the twist, (3, B, H, W)."""
     x = torch.stack(p)
-    (twist,) = _slopes(torch.stack(frame.du), -1)
+    twist = torch.stack([geometry.grid_slope(c, -1) for c in frame.du])
     bends = torch.stack([_bend(x, -2), _bend(x, -1), twist], dim=1)
     u, v = (geometry.norm(d).clamp_min(1e-6) for d in (frame.du, frame.dv))
     shares = geometry.dot(bends.unbind(), frame.normal)

@@ -44,7 +44,7 @@ def bending(p: Planes, frame: Frame) -> list[Tensor]:
 
 def _asinh(x: Tensor) -> Tensor:
     """Compute the inverse hyperbolic sine; PyTorch's own is not vectorised on CPUs."""
-    return (x.abs() + torch.hypot(x, torch.ones_like(x))).log().copysign(x)
+    return (x.abs() + torch.hypot(x, torch.ones_like(x))).log() * torch.sign(x)
 
 
 def stretching(frame: Frame, flat: Planes) -> list[Tensor]:

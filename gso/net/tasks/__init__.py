@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from gso.errors import OptionError
 from gso.net.tasks.base import NetTask
-from gso.registry import Registry
+from gso.registry import Plugins, Registry, lacks
 from gso.spelling import choices
 
 __all__ = ["NetTask", "add_task", "get", "names"]
 
 _FILES = Registry(__name__, __path__, ("base",))
 _ADDED: dict[str, NetTask] = {}
+#: Tasks of nets of installed packages.
+_PLUGINS = Plugins("gso.net.tasks", lacks("components", "figures", "score"))
 
 
 def _tasks() -> dict[str, NetTask]:
     files: list[NetTask] = [_FILES.get(name).TASK for name in _FILES.names()]
-    return {task.name: task for task in files} | _ADDED
+    more = {task.name: task for _, task in _PLUGINS.items()}
+    return more | {task.name: task for task in files} | _ADDED
 
 
 def names() -> list[str]:

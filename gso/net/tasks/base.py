@@ -35,7 +35,8 @@ class NetTask:
         Terms of the loss "published" that can be used.
     energy : callable, optional
         The loss "energy": ``energy(batch, phase, progress)`` returns a function that maps
-        results (B, H, W, d) to energies (B,).
+        results (B, H, W, d) to energies (B,), or to its weighted terms (B,) by name, which the
+        training curves then show.
     noisy : bool
         Whether inputs have noise and labels are the surfaces without it. The loss "clean" takes
         the place of "label" and "energy".

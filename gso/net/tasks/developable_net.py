@@ -51,7 +51,7 @@ def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     before = whole.at_start.clamp_min(_LEAST_ENERGY)
     typical = phase.weights.get("w_curvature", 1e-3) * TYPICAL_CURVATURE
     scale = before**balance * typical ** (1.0 - balance)
-    return lambda result: whole(result, eps) / scale
+    return lambda result: {name: term / scale for name, term in whole.parts(result, eps).items()}
 
 
 TASK = NetTask(

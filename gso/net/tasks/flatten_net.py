@@ -34,7 +34,7 @@ def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     """Return the optimiser's objective."""
     from gso.net.training.solver_energy import Strain
 
-    return Strain(batch.surface, flatten.Options())
+    return Strain(batch.surface, flatten.Options()).parts
 
 
 TASK = NetTask(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import torch
-from torch import Tensor, nn
+from torch import nn
 from torch.nn.parallel import DistributedDataParallel
 
 from gso.errors import OptionError
@@ -18,6 +19,7 @@ from gso.net.training.data import Tick
 from gso.net.training.learning_rate import place
 from gso.net.training.phase_objective import Objective
 from gso.net.training.processes import interruption, processes
+from gso.net.training.training_curves import Means
 from gso.net.training.training_run import MODEL, Run, begin
 from gso.quantities import as_positive
 from gso.typing import AnyPath, Json
@@ -40,7 +42,7 @@ class Report(NamedTuple):
     left : float
         Estimated remaining seconds, from the mean speed so far.
     loss : float
-        Mean loss of the last steps.
+        Mean loss of the last steps; NaN if all of them were skipped.
     figures : dict of str to float
         Metrics of the last validation.
     """
@@ -64,7 +66,8 @@ def train(
 ) -> Json:
     """Train a net, or resume an interrupted run.
 
-    The net is written to ``out/model.safetensors``, with its card, at each validation. A killed
+    The net is written to ``out/model.safetensors``, with its card, at each validation, and to
+    ``out/best.safetensors`` when its validation score is the best so far. A killed
     run resumes from its last checkpoint. It ends with the same weights if its length is given
     in steps, not in minutes. Under ``torchrun`` the processes share the surfaces of each step.
 
@@ -123,7 +126,7 @@ def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable
         objective = DistributedDataParallel(objective)
     start, before = time.monotonic(), run.spent
     validated = kept = run.spent
-    losses: list[Tensor] = []
+    means = Means()
     while (progress := run.progress) < 1.0:
         at = place(config.phases, progress, config.warm_up)
         batch = run.source.batch(
@@ -133,25 +136,27 @@ def _loop(run: Run, show: Callable[[Report], None] | None, interrupted: Callable
             for group in optimiser.param_groups:
                 group["lr"] = at.rate
             optimiser.zero_grad(set_to_none=True)
-        loss = objective(batch, at.phase, at.progress)
+        loss, terms = objective(batch, at.phase, at.progress)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(run.net.parameters(), at.phase.clip)
         # A step with a non-finite gradient is skipped; it must not spoil the run.
         if bool(norm.isfinite()):
             for optimiser in run.optimisers:
                 optimiser.step()
+            means.add(loss=loss.detach(), **{f"loss/{name}": term for name, term in terms.items()})
+        else:
+            run.skipped += 1
         run.step += 1
         run.follow()
-        losses.append(loss.detach())
         run.spent = before + time.monotonic() - start
         if run.step % _REPORT == 0:
-            mean = float(torch.stack(losses).mean())
-            losses.clear()
+            values = means.taken()
             if run.curves is not None:
-                run.curves.add(run.step, run.spent, loss=mean, rate=at.rate, phase=at.number)
+                rest = {"rate": at.rate, "phase": at.number, "skipped": run.skipped}
+                run.curves.add(run.step, run.spent, **values, **rest)
             if show is not None and here.first:
                 left = run.spent / max(progress, 1e-9) * (1.0 - progress)
-                show(Report(run.step, progress, left, mean, run.figures))
+                show(Report(run.step, progress, left, values.get("loss", math.nan), run.figures))
         if here.agreed(run.spent - validated) > config.validate_every:
             run.validate()
             validated = run.spent = before + time.monotonic() - start

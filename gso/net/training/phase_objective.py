@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import torch
 from torch import Tensor, nn
@@ -18,7 +18,8 @@ from gso.net.training.data import Batch
 #: Lower bound on the size of a label's displacement, by which the misfit is divided.
 _LEAST = 3e-3
 
-Cost = Callable[[Tensor], Tensor]
+#: Loss (B,) of results (B, H, W, d): the weighted terms by name, or their sum.
+Cost = Callable[[Tensor], Mapping[str, Tensor] | Tensor]
 Term = Callable[[Tensor, Tensor], Tensor]
 
 
@@ -29,14 +30,24 @@ class Objective(nn.Module):
         super().__init__()
         self.net = net
 
-    def forward(self, batch: Batch, phase: Phase, progress: float) -> Tensor:
-        """Compute the mean loss of a batch; `progress` runs from 0 to 1 within the phase."""
+    def forward(
+        self, batch: Batch, phase: Phase, progress: float
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Compute the mean loss of a batch, and its weighted terms, as constants.
+
+        `progress` runs from 0 to 1 within the phase.
+        """
         start = self.net.initial_geometry(batch.surface)
         # Steps train the passes in turn; earlier passes only compute the input of the last one.
         passes = 1 + batch.step % self.net.passes
         moved = self.net.displacements(batch.surface, batch.sigma, passes=passes)
         cost = _COSTS[phase.loss](self.net.kind, batch, start, phase, progress)
-        return cost(start + moved).mean()
+        found = cost(start + moved)
+        if isinstance(found, Tensor):
+            found = {phase.loss: found}
+        terms = {name: term.mean() for name, term in found.items()}
+        whole = torch.stack(list(found.values())).sum(0).mean()
+        return whole, {name: term.detach() for name, term in terms.items()}
 
 
 def _published(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
@@ -45,12 +56,12 @@ def _published(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progres
         weights["in"] *= math.exp(-phase.decay * progress)
     terms = _TERMS
     if phase.labelled:
-        label = _label(task, batch, start, phase, progress)
+        label = _label_distance(task, batch, start)
         terms = terms | {"label": lambda result, _: label(result)}
-    used = [(weight, terms[name]) for name, weight in weights.items() if weight]
+    used = [(name, weight, terms[name]) for name, weight in weights.items() if weight]
 
-    def cost(result: Tensor) -> Tensor:
-        return torch.stack([weight * term(result, batch.compared) for weight, term in used]).sum(0)
+    def cost(result: Tensor) -> dict[str, Tensor]:
+        return {name: weight * term(result, batch.compared) for name, weight, term in used}
 
     return cost
 
@@ -77,6 +88,10 @@ _TERMS: dict[str, Term] = {
 
 
 def _label(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: float) -> Cost:
+    return _label_distance(task, batch, start)
+
+
+def _label_distance(task: NetTask, batch: Batch, start: Tensor) -> Callable[[Tensor], Tensor]:
     """Return the root-mean-square distance to the label, divided by that of the start."""
     if batch.target is None:
         raise ValueError("a batch without labels")
@@ -103,10 +118,10 @@ def _clean(task: NetTask, batch: Batch, start: Tensor, phase: Phase, progress: f
     exact = planes(target)
     factor = phase.weights.get("angle", 0.1)
 
-    def cost(result: Tensor) -> Tensor:
+    def cost(result: Tensor) -> dict[str, Tensor]:
         miss = (result - target).square().sum(dim=-1).mean(dim=(1, 2))
         angle = torch.rad2deg(training_losses.normal_angles(exact, planes(result)))
-        return (miss + 1e-12).sqrt() / sigma + factor * angle
+        return {"distance": (miss + 1e-12).sqrt() / sigma, "angle": factor * angle}
 
     return cost
 

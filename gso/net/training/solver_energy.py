@@ -165,7 +165,7 @@ class Strain:
 
     def __post_init__(self) -> None:
         p = planes(self.surface)
-        cell = grid_geometry.corners(p)
+        cell = geometry.cell_corners(p)
         rest, self.sound = [], []
         for a, b, c in stretch.corners_of(4):
             frame = geometry.rest_frame(cell[a], cell[b], cell[c])
@@ -179,7 +179,7 @@ class Strain:
 
     def residuals(self, flat: Tensor) -> Tensor:
         """Compute strain residuals (12, B, H-1, W-1); see :func:`gso.energy.stretch.residual`."""
-        r = torch.stack(stretch.residual(grid_geometry.corners(planes(flat)), self.rest))
+        r = torch.stack(stretch.residual(geometry.cell_corners(planes(flat)), self.rest))
         good = torch.stack(self.sound)
         return torch.where(good.repeat(3, 1, 1, 1), r, torch.zeros_like(r))
 
@@ -190,6 +190,10 @@ class Strain:
 
     def __call__(self, flat: Tensor) -> Tensor:
         """Compute the energy (B,) of flat images (B, H, W, 2), divided by their typical strain."""
+        return sum(self.parts(flat).values())  # type: ignore[return-value]
+
+    def parts(self, flat: Tensor) -> dict[str, Tensor]:
+        """Compute the weighted energy (B,) of each term, divided by the typical strain."""
         o = self.options
         r = self.residuals(flat)
         level = self.level(r.detach()).clamp_min(_LEAST_STRAIN)[:, None, None].expand_as(r[0])
@@ -205,8 +209,7 @@ class Strain:
             (change,) = edges.residual([origin, d], [inverse])
             total = total + absolute.value(change).sum(dim=(1, 2))
             count += change[0].numel()
-        energy: Tensor = cost / typical + o.w_edges * total / count
-        return energy
+        return {"strain": cost / typical, "edges": o.w_edges * total / count}
 
 
 def _edges(p: Planes) -> list[Planes]:

@@ -7,6 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import torch
+from torch import Tensor
+
 from gso.io.atomic import write_bytes
 
 NAME = "curves.jsonl"
@@ -49,6 +52,31 @@ class Curves:
         """Close the event files."""
         if self._writer is not None:
             self._writer.close()
+
+
+class Means:
+    """Means of values over the steps since they were last taken.
+
+    >>> means = Means()
+    >>> means.add(loss=torch.tensor(1.0))
+    >>> means.add(loss=torch.tensor(2.0), fair=torch.tensor(5.0))
+    >>> means.taken(), means.taken()
+    ({'loss': 1.5, 'fair': 5.0}, {})
+    """
+
+    def __init__(self) -> None:
+        self._values: dict[str, list[Tensor]] = {}
+
+    def add(self, **values: Tensor) -> None:
+        """Add the values of a step; each is averaged over the steps that have it."""
+        for name, value in values.items():
+            self._values.setdefault(name, []).append(value)
+
+    def taken(self) -> dict[str, float]:
+        """Return the means, and begin anew."""
+        means = {name: float(torch.stack(each).mean()) for name, each in self._values.items()}
+        self._values.clear()
+        return means
 
 
 def _what(row: dict[str, float]) -> tuple[float, frozenset[str]]:

@@ -116,7 +116,7 @@ def iso_cell(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Te
 def _defects(surface: Tensor, flat: Tensor) -> Tensor:
     """Compute the three parts of every cell's isometry defect, (3, B, H-1, W-1)."""
     (a, b), (a2, b2) = (
-        geometry.diagonals(*grid_geometry.corners(planes(x))) for x in (surface, flat)
+        geometry.diagonals(*geometry.cell_corners(planes(x))) for x in (surface, flat)
     )
     return torch.stack(geometry.isometry_defect(a, b, a2, b2))
 
@@ -135,7 +135,7 @@ def iso_weights(surface: Tensor) -> Tensor:
     k = grid_geometry.curvature(p).abs()
     ones = torch.ones_like(k)
     total, count = (
-        torch.stack([c for (c,) in grid_geometry.corners((pad(x, (1, 1, 1, 1)),))]).sum(dim=0)
+        torch.stack([c for (c,) in geometry.cell_corners((pad(x, (1, 1, 1, 1)),))]).sum(dim=0)
         for x in (k, ones)
     )
     mean = total / count.clamp_min(1.0)
@@ -145,6 +145,6 @@ def iso_weights(surface: Tensor) -> Tensor:
 def normal_angles(clean: Planes, result: Planes) -> Tensor:
     """Compute the mean angle (B,) between the normals of the cells, in radians."""
     first, second = (
-        geometry.cross(*geometry.diagonals(*grid_geometry.corners(p))) for p in (clean, result)
+        geometry.cross(*geometry.diagonals(*geometry.cell_corners(p))) for p in (clean, result)
     )
     return geometry.angle(first, second).mean(dim=(1, 2))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
 import platform
 from dataclasses import dataclass, field
@@ -27,7 +28,7 @@ from gso.net.training.validate import applied, mean_figures
 from gso.typing import Json
 
 #: Files of a run.
-CHECKPOINT, MODEL = "checkpoint.safetensors", "model.safetensors"
+CHECKPOINT, MODEL, BEST = "checkpoint.safetensors", "model.safetensors", "best.safetensors"
 #: Seed of the noise that validation adds.
 _NOISE = 7
 #: Number of surfaces per block when the processes apply another net to the surfaces.
@@ -51,7 +52,9 @@ class Run:
     begun_with: Json
     step: int = 0
     spent: float = 0.0
+    skipped: int = 0
     figures: dict[str, float] = field(default_factory=dict)
+    best: dict[str, float] = field(default_factory=dict)
     card: Json = field(default_factory=dict)
     curves: Curves | None = None
 
@@ -81,7 +84,9 @@ class Run:
             state = {
                 "step": self.step,
                 "spent": self.spent,
+                "skipped": self.skipped,
                 "figures": self.figures,
+                "best": self.best,
                 **self.same(),
             }
             path = self.folder / CHECKPOINT
@@ -92,13 +97,21 @@ class Run:
         return {"config": _kept(self.config), "data": self.origin["data"], "limit": self.limit}
 
     def validate(self) -> None:
-        """Compute validation metrics of the averaged net, and write it with its card."""
+        """Compute validation metrics of the averaged net, and write it with its card.
+
+        If its score is the best so far, it is also written as the best net.
+        """
         if self.here.first:
             surfaces, truths, sigma = self.check
             results = applied(self.average.eval(), surfaces, sigma)
             self.figures = mean_figures(self.config.task, truths.double().numpy(), results)
             if self.curves is not None:
                 self.curves.add(self.step, self.spent, **self.figures)
+            score = self.figures[tasks.get(self.config.task).score]
+            if score < self.best.get("score", math.inf):
+                self.best = {"steps": self.step, "score": score}
+                card = self._card() | {"checkpoint": "best"}
+                weights.save(self.average, self.folder / BEST, card)
             self.card = weights.save(self.average, self.folder / MODEL, self._card())
         self.here.wait()
 
@@ -106,7 +119,10 @@ class Run:
         card = {
             "name": self.config.name,
             "config": self.config.as_dict(),
+            "checkpoint": "last",
+            "best": self.best,
             "steps": self.step,
+            "skipped": self.skipped,
             "hours": round(self._hours_before + self.spent / 3600, 3),
             "validation": self.figures,
             **self.origin,
@@ -165,7 +181,7 @@ def begin(
     torch.manual_seed(config.seed)
     net = weights.make(dict(config.model) | {"task": config.task})
     if config.init:
-        _take(net, weights.load(config.init), config.init)
+        _take(net, weights.load(config.init, device="cpu"), config.init)
     through, teacher = (_other(config, word, here) for word in ("through", "teacher"))
     net = weights.placed(net, here.device)
     net.bf16 = _fast(here.device) if config.bf16 is None else config.bf16
@@ -207,6 +223,7 @@ def begin(
                 raise OptionError(f"{folder} holds a run with another {other}; take another folder")
         state = checkpoint.load(path, net, average, run.optimisers)
         run.step, run.spent, run.figures = state["step"], state["spent"], state["figures"]
+        run.skipped, run.best = state.get("skipped", 0), state.get("best", {})
     run.source = run.source.placed(here.device)
     if here.first:
         run.curves = Curves(folder, run.step)

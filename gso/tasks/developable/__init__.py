@@ -46,6 +46,7 @@ TASK = Task(
             schedule.plan,
             limits=("max_deviation", "max_strain", "target_curvature"),
             search=search,
+            terms=True,
         ),
         "isometry": Formulation(
             joint_isometry.Options,

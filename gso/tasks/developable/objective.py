@@ -153,7 +153,7 @@ def _terms(
     if o.w_facing > 0.0:
         items.append(Weighted(_facing(mesh), o.w_facing))
     items.append(Weighted(elongation.build(mesh), o.w_elongation))
-    return items
+    return items + request.own_items(mesh, items)
 
 
 def _facing(mesh: Mesh) -> Term:

@@ -32,6 +32,7 @@ from gso.tasks.flatten.stages import (
     STRAINED,
     planned_stages,
     strain_stage,
+    with_own_terms,
 )
 from gso.tasks.request import Request
 from gso.typing import Array
@@ -65,7 +66,8 @@ def plan(analysis: Analysis, request: Request[Options]) -> Plan:
         planned = planned_stages(request, [mesh], typical)[-1:]
         strained = parametrization.strain(mesh, given) > STRAINED * start.level
         if strained and request.formulation == "strain":
-            planned = [strain_stage(replace(options, norm="l2"), mesh, 1.0), *planned]
+            first_stage = strain_stage(replace(options, norm="l2"), mesh, 1.0)
+            planned = [with_own_terms(request, mesh, first_stage), *planned]
     first = start.flat if given is None else given
     finish = partial(_finish, opened, given)
     if not constraints.empty:
@@ -102,6 +104,7 @@ def _add_constraints(
 ) -> list[Stage]:
     """Plan stages under constraints: first soft with growing weight, then as they are given."""
     even = strain_stage(replace(request.options, norm="l2"), analysis.mesh, 1.0)
+    even = with_own_terms(request, analysis.mesh, even)
     steps = constrained.gradual(analysis.constraints, replace(even, iterations=30))
     return [*steps, *(replace(stage, imposed=analysis.imposed) for stage in (even, *stages))]
 
@@ -159,10 +162,10 @@ def metrics(mesh: Mesh, after: Mesh | None, flat: Array, scale: float) -> dict[s
 
 TASK = Task(
     {
-        "strain": Formulation(Options, plan),
-        "lengths": Formulation(Options, plan),
-        "isometry": Formulation(Options, plan, presets=("jiang2020",)),
-        "minimax": Formulation(Options, plan),
+        "strain": Formulation(Options, plan, terms=True),
+        "lengths": Formulation(Options, plan, terms=True),
+        "isometry": Formulation(Options, plan, presets=("jiang2020",), terms=True),
+        "minimax": Formulation(Options, plan, terms=True),
     },
     metrics,
     flat=True,

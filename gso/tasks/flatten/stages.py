@@ -68,6 +68,8 @@ def planned_stages(request: Request[Options], levels: list[Mesh], level: float) 
         stages.append(_minimax_stage(options, mesh, level))
     elif options.norm == "l1":
         stages.append(strain_stage(options, mesh, level))
+    last = len(levels) - 1
+    stages = [with_own_terms(request, levels[min(k, last)], s) for k, s in enumerate(stages)]
     # On meshes that are not grids the last stage starts farther from the minimum.
     closer = 1.0 if levels[-1].grid_index is not None else 0.2
     tolerance, rising = closer * options.tolerance, 0
@@ -78,6 +80,14 @@ def planned_stages(request: Request[Options], levels: list[Mesh], level: float) 
     if request.formulation == "strain" and level > FAR_FROM_FLAT:
         stages = [*stages[:-1], *_unsqueezing(mesh, stages[-1])]
     return stages
+
+
+def with_own_terms(request: Request[Options], mesh: Mesh, stage: Stage) -> Stage:
+    """Add the user's own terms to a stage on a mesh, a flat image of which it computes."""
+    if not request.terms:
+        return stage
+    own = per_component.objective(mesh, lambda one: request.own_items(one, stage.own_items))
+    return replace(stage, own_items=[*stage.own_items, *own])
 
 
 def _unsqueezing(mesh: Mesh, last: Stage) -> list[Stage]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import diags, identity, kron
 
-from gso import geometry, parametrization
+from gso import geometry
 from gso.errors import MeshError
 from gso.linalg import spd
 from gso.mesh import Mesh
+from gso.parametrization.embedding import parts, spanned
 from gso.spline import basis, basis_matrix, clamped_knots
 from gso.typing import Array, Ints
 
@@ -82,18 +82,18 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
     >>> bool(np.allclose(patch.at_vertices(patch.grid), mesh.vertices))
     True
     """
-    loops, parts = mesh.boundary_loops, parametrization.parts(mesh)
-    if not loops or mesh.euler_characteristic != 2 - len(loops) or len(parts) > 1:
+    loops, pieces = mesh.boundary_loops, parts(mesh)
+    if not loops or mesh.euler_characteristic != 2 - len(loops) or len(pieces) > 1:
         raise MeshError("it is not one piece with a boundary and without handles")
-    piece = _unit(mesh, parts[0])
+    piece = _unit(mesh, pieces[0])
     loop, at, sides = _boundary(piece)
-    image = parametrization.spanned(_filled(piece, loop), loop, at)[: len(piece.vertices)]
+    image = spanned(_filled(piece, loop), loop, at)[: len(piece.vertices)]
     parameters = (image / sides).clip(0.0, 1.0)
     fitted, grid = _spline(piece.vertices, parameters, size)
     far = float(np.linalg.norm(fitted - piece.vertices, axis=1).max())
     if not far <= _FAR:
         raise MeshError("it is no surface that a grid of few vertices follows")
-    return Patch(mesh.frame.to_user(grid), parts[0], parameters)
+    return Patch(mesh.frame.to_user(grid), pieces[0], parameters)
 
 
 def _unit(mesh: Mesh, ids: Ints) -> Mesh:
@@ -179,6 +179,8 @@ def _corners(turning: Array, lengths: Array) -> list[int]:
 
 def _spline(points: Array, parameters: Array, size: int) -> tuple[Array, Array]:
     """Fit a smooth bicubic spline to points; evaluate it at their parameters and on a grid."""
+    from scipy.sparse import diags, identity, kron
+
     count = int(np.clip(0.75 * np.sqrt(len(points)), 4, _CONTROLS))
     knots = clamped_knots(count)
     u, v = (basis_matrix(knots, count, x) for x in parameters.T)

@@ -1,0 +1,251 @@
+"""Nets as ONNX files: what they compute, their cards, and predictions without PyTorch."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from gso import BackendError, OptionError, WeightsError
+from tests.conftest import saddle
+
+torch = pytest.importorskip("torch")
+onnxruntime = pytest.importorskip("onnxruntime")
+pytest.importorskip("onnxscript")
+
+from gso.net import (  # noqa: E402
+    CHAINS,
+    CoarseNet,
+    GSONet,
+    available,
+    export,
+    load,
+    predict,
+    read_card,
+    save,
+)
+from tests.test_net import shaken  # noqa: E402
+
+# An export takes ten seconds, also of a small net.
+pytestmark = pytest.mark.slow
+
+SMALL = {"widths": (8, 8, 8), "depths": (1, 1, 1)}
+#: Equal to this, in radii of the unit ball.
+CLOSE = 1e-4
+
+
+def nets():
+    return {
+        "coarse": shaken(CoarseNet(**SMALL, passes=2), size=0.02),
+        "flat": shaken(CoarseNet("flatten", **SMALL, passes=1), size=0.02),
+        "noise": shaken(
+            GSONet("denoise", channels=4, blocks=1, sigma=True, aligned=True, stencils=True),
+            size=0.01,
+        ),
+    }
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The nets, and their exported files."""
+    folder = tmp_path_factory.mktemp("exported")
+    found = {}
+    for name, net in nets().items():
+        (path,) = export(net, folder / f"{name}.onnx")
+        found[name] = net, path
+    return found
+
+
+@pytest.mark.parametrize("name", ["coarse", "flat", "noise"])
+@pytest.mark.parametrize("shape", [(64, 64), (40, 90), (3, 64, 64)])
+def test_predictions_are_those_of_pytorch(files, name, shape):
+    net, path = files[name]
+    rng = np.random.default_rng(0)
+    points = saddle(91)[: shape[-2], : shape[-1]]
+    points = 7.0 * points + 1e-3 * rng.normal(size=(*shape, 3)) * (name == "noise") + 100.0
+    for more in ({}, {"sigma": 0.01} if name == "noise" else {"device": "cpu"}):
+        ours, theirs = (predict(points, task=net.task, model=m, **more) for m in (net, path))
+        assert ours.shape == theirs.shape
+        assert np.abs(ours - theirs).max() < 7.0 * CLOSE
+    if name != "flat":
+        assert np.abs(ours - points).max() > 100 * np.abs(ours - theirs).max()
+
+
+def test_the_file_is_described(files):
+    net, path = files["noise"]
+    card = read_card(path)
+    assert path.with_name("noise.onnx.json").exists()
+    assert card["task"] == "denoise" and card["model"]["kind"] == "gsonet"
+    assert card["onnx"] == {
+        "opset": 18,
+        "inputs": ["surface", "sigma"],
+        "outputs": ["displacements"],
+        "size": 64,
+        "passes": 1,
+    }
+    session = onnxruntime.InferenceSession(path)
+    assert [i.name for i in session.get_inputs()] == card["onnx"]["inputs"]
+    assert session.get_inputs()[0].shape == ["batch", 64, 64, 3]
+    # Outside of the package: positions in, displacements out.
+    unit = torch.as_tensor(saddle(64)[None], dtype=torch.float32)
+    level = torch.tensor([0.01])
+    (moved,) = session.run(["displacements"], {"surface": unit.numpy(), "sigma": level.numpy()})
+    with torch.inference_mode():
+        expected = net(unit, level)
+    np.testing.assert_allclose(unit + moved, expected, atol=1e-5)
+
+
+def test_fewer_passes(files, tmp_path):
+    net, path = files["coarse"]
+    (once,) = export(net, tmp_path / "once.onnx", passes=1)
+    ours, theirs = (predict(saddle(64), model=m, passes=1) for m in (net, once))
+    assert np.abs(ours - theirs).max() < CLOSE
+    with pytest.raises(OptionError, match=r"exported with 2 passes, not 1"):
+        predict(saddle(64), model=path, passes=1)
+    with pytest.raises(OptionError, match="from 1 to 2"):
+        export(net, tmp_path / "often.onnx", passes=3)
+
+
+def test_several_nets_one_after_the_other(files):
+    net, path = files["coarse"]
+    twice = predict(predict(saddle(64), model=net), model=net)
+    for models in ([net, path], (path, path)):
+        assert np.abs(predict(saddle(64), model=models) - twice).max() < 2 * CLOSE
+    with pytest.raises(OptionError, match="empty"):
+        predict(saddle(64), model=[])
+
+
+class TestFiles:
+    @pytest.fixture
+    def path(self, files, tmp_path):
+        _, path = files["coarse"]
+        for source in (path, path.with_name("coarse.onnx.json")):
+            (tmp_path / source.name).write_bytes(source.read_bytes())
+        return tmp_path / "coarse.onnx"
+
+    def test_the_card_of_the_weights_beside_it_stays(self, tmp_path):
+        net = nets()["noise"]
+        save(net, tmp_path / "net.safetensors")
+        before = (tmp_path / "net.json").read_bytes()
+        export(tmp_path / "net.safetensors", tmp_path / "net.onnx")
+        assert (tmp_path / "net.json").read_bytes() == before
+        assert load(tmp_path / "net.safetensors").task == "denoise"
+
+    def test_damage(self, path):
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 1
+        path.write_bytes(data)
+        with pytest.raises(WeightsError, match="is damaged"):
+            predict(saddle(8), model=path)
+
+    def test_no_card(self, path):
+        path.with_name("coarse.onnx.json").unlink()
+        with pytest.raises(WeightsError, match=r"coarse\.onnx\.json cannot be read"):
+            predict(saddle(8), model=str(path))
+
+    def test_no_file(self, path):
+        path.unlink()
+        with pytest.raises(WeightsError, match="cannot be read"):
+            predict(saddle(8), model=path)
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"onnx": {}},
+            {"onnx": {"inputs": ["x"], "outputs": ["y"], "passes": 1}},
+            {"task": "no task"},
+        ],
+    )
+    def test_another_card(self, path, change):
+        card = path.with_name("coarse.onnx.json")
+        card.write_text(json.dumps(json.loads(card.read_text()) | change))
+        with pytest.raises(WeightsError, match=r"coarse\.onnx"):
+            predict(saddle(8), model=path)
+
+    def test_other_uses(self, path, tmp_path, monkeypatch):
+        with pytest.raises(OptionError, match="for task 'developable', not 'flatten'"):
+            predict(saddle(8), task="flatten", model=path)
+        with pytest.raises(OptionError, match="no device 'tape'"):
+            predict(saddle(8), model=path, device="tape")
+        with pytest.raises(WeightsError, match="without weights to load"):
+            load(path)
+        with pytest.raises(WeightsError, match="no net 'nothing'"):
+            export("nothing", tmp_path / "a.onnx")
+        monkeypatch.setattr("gso.net.onnx_file.find_spec", lambda name: None)
+        with pytest.raises(BackendError, match=r'pip install "\.\[onnx\]"'):
+            export(nets()["noise"], tmp_path / "a.onnx")
+
+
+WITHOUT = """
+import sys, importlib.util
+real = importlib.util.find_spec
+hidden = set(sys.argv[1].split(","))
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in hidden:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Hidden())
+def find_spec(name, package=None):
+    return None if name in hidden else real(name, package)
+importlib.util.find_spec = find_spec
+import numpy as np, gso
+points = np.load("points.npy")
+"""
+
+
+def run_without(hidden, code, folder):
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT + code, hidden],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_predictions_and_starts_without_pytorch(files, tmp_path):
+    net, path = files["coarse"]
+    once = tmp_path / "once.onnx"
+    export(net, once, passes=1)
+    points = saddle(40)
+    np.save(tmp_path / "points.npy", points)
+    code = f"""
+np.save("found.npy", gso.net.predict(points, model={str(path)!r}))
+try:
+    gso.net.predict(points)
+except gso.BackendError as error:
+    print(error)
+print(gso.hybrid.solve(points, net={str(once)!r}, polish=False, verdict=False).warm_start)
+print("torch" in sys.modules)
+"""
+    said = run_without("torch,safetensors", code, tmp_path).splitlines()
+    assert "nets need torch" in said[0] and "gso.net.export" in said[0]
+    assert said[1:] == ["net", "False"]
+    moved = np.load(tmp_path / "found.npy")
+    assert np.abs(moved - predict(points, model=net)).max() < CLOSE
+
+
+def test_without_the_runtime(files, tmp_path):
+    np.save(tmp_path / "points.npy", saddle(8))
+    code = f"""
+try:
+    gso.net.predict(points, model={str(files["coarse"][1])!r})
+except gso.BackendError as error:
+    print(error)
+"""
+    assert 'pip install ".[onnx]"' in run_without("onnxruntime", code, tmp_path)
+
+
+@pytest.mark.parametrize("name", available())
+def test_every_net_of_the_package(name, tmp_path):
+    task = load(CHAINS.get(name, (name,))[0]).task
+    exported = export(name, tmp_path / f"{name}.onnx")
+    assert len(exported) == len(CHAINS.get(name, (name,)))
+    for points in (saddle(64), saddle(64)[:40]):
+        ours, theirs = (predict(points, task=task, model=m) for m in (name, exported))
+        assert np.abs(ours - theirs).max() < CLOSE

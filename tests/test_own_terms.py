@@ -1,0 +1,137 @@
+"""Terms of the user's own in the objectives of tasks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gso
+from gso import OptionError
+from gso.energy import Term, Weighted, mean_weights
+from tests.conftest import cylinder, saddle
+
+
+def height(points, constants):
+    """How far a vertex is from the plane z = 0."""
+    ((_, _, z),) = points
+    return (z,)
+
+
+def shear(points, constants):
+    """The product of a vertex's coordinates, zero on the axes."""
+    ((x, y),) = points
+    return (x * y,)
+
+
+class Own:
+    """Builds a term with one element for each vertex; remembers the meshes."""
+
+    def __init__(self, residual=height, block="surface", weight=1.0, name="own"):
+        self.residual, self.block, self.weight, self.name = residual, block, weight, name
+        self.meshes = []
+
+    def __call__(self, mesh):
+        self.meshes.append(mesh)
+        ids = np.arange(len(mesh.vertices))[:, None]
+        term = Term(self.name, self.residual, ((self.block, ids),), mean_weights(len(ids)))
+        return [Weighted(term, self.weight)]
+
+
+def triangles(points):
+    return gso.Mesh(points.reshape(-1, 3), gso.Mesh.from_grid(points).triangles)
+
+
+@pytest.mark.parametrize("make", [gso.Mesh.from_grid, triangles])
+def test_a_term_joins_the_objective(make):
+    design = make(saddle(33))
+    # Without a verdict there is no second solve nearer to the design.
+    plain, result = (
+        gso.tno.optimize(design, formulation="curvature", terms=terms, verdict=False)
+        for terms in ((), [Own()])
+    )
+    assert "own" not in plain.energy and result.energy["own"] > 0
+    assert set(result.energy) == {*plain.energy, "own"}
+    flatter = [np.ptp(r.mesh.vertices[:, 2]) for r in (plain, result)]
+    assert flatter[1] < 0.5 * flatter[0]
+    assert result.metrics.keys() == plain.metrics.keys()
+
+
+def test_a_term_is_built_for_every_level():
+    own = Own(weight=1e-3)
+    result = gso.tno.optimize(saddle(65), terms=[own])
+    assert "strain_max" in result.metrics
+    sides = {mesh.grid_shape[0] for mesh in own.meshes}
+    assert len(sides) > 1 and max(sides) == 65
+    for mesh in own.meshes:
+        assert np.linalg.norm(mesh.vertices, axis=1).max() == pytest.approx(1.0, abs=0.05)
+    # The energy is that of the term at the result, in the unit ball.
+    frame = result.design.frame
+    z = frame.to_unit(result.mesh.vertices)[:, 2]
+    assert result.energy["own"] == pytest.approx(1e-3 * 0.5 * np.mean(z**2), rel=1e-6)
+
+
+def test_a_term_without_weight_changes_nothing():
+    plain, result = (
+        gso.tno.optimize(saddle(33), formulation="curvature", terms=terms)
+        for terms in ((), [Own(weight=0.0)])
+    )
+    np.testing.assert_array_equal(result.mesh.vertices, plain.mesh.vertices)
+
+
+@pytest.mark.parametrize("formulation", ["strain", "lengths", "isometry", "minimax"])
+def test_a_term_of_a_flat_image(formulation):
+    design = saddle(33)
+    plain = gso.tno.optimize(design, task="flatten", formulation=formulation)
+    own = Own(shear, "flat", 10.0)
+    result = gso.tno.optimize(design, task="flatten", formulation=formulation, terms=[own])
+    assert result.energy["own"] > 0
+    products = [
+        np.mean(np.prod(r.flat - r.flat.mean(axis=0), axis=1) ** 2) for r in (plain, result)
+    ]
+    assert products[1] < products[0]
+
+
+def test_limits_components_and_warm_starts():
+    far = saddle(17) + np.array([5.0, 0.0, 0.0])
+    two = gso.Mesh(
+        np.concatenate([saddle(17).reshape(-1, 3), far.reshape(-1, 3)]),
+        np.concatenate([(faces := gso.Mesh.from_grid(far).faces), faces + 17 * 17]),
+    )
+    for keywords in ({"max_deviation": "2%"}, {"x0": saddle(17)}):
+        assert gso.tno.optimize(saddle(17), terms=[Own()], **keywords).energy["own"] >= 0
+    own = Own()
+    assert gso.tno.optimize(two, terms=[own]).energy["own"] > 0
+    assert {len(mesh.vertices) for mesh in own.meshes} == {17 * 17}
+
+
+def test_hybrid_solves_take_terms():
+    own = Own()
+    result = gso.hybrid.solve(saddle(33), terms=[own])
+    assert result.energy["own"] > 0 and own.meshes
+    with pytest.raises(OptionError, match="list of callables"):
+        gso.hybrid.solve(saddle(9), terms=[3])
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"task": "denoise"}, "takes no terms; these do: 'developable' by 'curvature'"),
+        ({"formulation": "isometry"}, "formulation 'isometry' of task 'developable' takes no"),
+        ({"formulation": "ruled"}, "'ruled'"),
+        ({"task": "bend"}, "task 'bend' takes no terms"),
+        ({"terms": Own()}, "list of callables"),
+        ({"terms": [lambda mesh: [1.0]]}, "1.0 is no gso.energy.Weighted"),
+        ({"terms": [lambda mesh: None]}, "returns None"),
+        ({"terms": [Own(name="curvature")]}, "'curvature' is that of a term"),
+    ],
+)
+def test_refusals(keywords, words):
+    with pytest.raises(OptionError, match=words):
+        gso.tno.optimize(cylinder(9) + saddle(9), **{"terms": [Own()], **keywords})
+
+
+def test_a_cut_design_takes_none():
+    design = gso.Mesh.from_grid(saddle(9))
+    pieces = gso.cut(design, gso.seams.Path([4, 76]))
+    with pytest.raises(OptionError, match="cut into pieces takes no terms"):
+        gso.tno.optimize(pieces, terms=[Own()])
