@@ -97,7 +97,7 @@ def predictions(
         spent[k] = time.perf_counter() - clock
     for group in sizes.values():
         clock = time.perf_counter()
-        moved = _predicted(np.stack([grid for _, grid, _ in group]), task, net, passes)
+        moved = _predicted(np.stack([grid for _, grid, _ in group]), task, net, passes, alone)
         share = (time.perf_counter() - clock) / len(group)
         for (k, grid, patch), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
@@ -157,14 +157,15 @@ def _check_curvature(grid: Array) -> None:
 
 
 def _predicted(
-    grids: Array, task: str, net: NetLike | None, passes: int | None
+    grids: Array, task: str, net: NetLike | None, passes: int | None, alone: bool
 ) -> Sequence[Array | str]:
     """Return the result (H, W, d), or the error message, for each grid."""
     from gso.net import predict
 
     try:
-        return list(predict(grids, task=task, model=net, passes=passes))
+        # Where a solve follows, its energy decides whether the result is used.
+        return list(predict(grids, task=task, model=net, passes=passes, guarded=alone))
     except MeshError as error:
         if len(grids) == 1:
             return [str(error)]
-        return [_predicted(grid[None], task, net, passes)[0] for grid in grids]
+        return [_predicted(grid[None], task, net, passes, alone)[0] for grid in grids]

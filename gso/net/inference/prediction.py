@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, cast, overload
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Smallest side of a grid that is resampled to the size of the nets.
 SMALLEST = 4
+#: Factors on displacements that are tried, where the whole ones would do harm.
+_FACTORS = (1.0, 0.5, 0.25)
 #: Number of surfaces per batch.
 _BATCH = 64
 
@@ -41,6 +43,7 @@ def predict(
     passes: int | None = ...,
     sigma: float | None = ...,
     device: str | None = ...,
+    guarded: bool = ...,
 ) -> Mesh: ...
 @overload
 def predict(
@@ -52,6 +55,7 @@ def predict(
     passes: int | None = ...,
     sigma: float | None = ...,
     device: str | None = ...,
+    guarded: bool = ...,
 ) -> Array: ...
 def predict(
     surface: MeshLike | ArrayLike,
@@ -62,8 +66,9 @@ def predict(
     passes: int | None = None,
     sigma: float | None = None,
     device: str | None = None,
+    guarded: bool = True,
 ) -> Mesh | Array:
-    """Make surfaces developable, flatten or denoise them with a net.
+    r"""Make surfaces developable, flatten or denoise them with a net.
 
     Surfaces are normalised to the unit ball, and results are transformed back. The nets are
     trained on 64 x 64 vertices. Other grids are resampled to that size by cubic splines, and
@@ -102,6 +107,10 @@ def predict(
         input ignore it.
     device : str, optional
         "cpu", "cuda" ...; by default the GPU if there is one.
+    guarded : bool
+        "developable": whether to halve displacements that leave more mean \|K\|, in the worse split
+        of the quads, than the input has, and to return the input if that does not help. Surfaces
+        that are developable, or have noise that the nets do not know, so come back as they are.
 
     Returns
     -------
@@ -146,6 +155,7 @@ def predict(
             passes=passes,
             sigma=sigma,
             device=device,
+            guarded=guarded,
         )
         found = at_vertices(mesh, grid, patch, done)
         return mesh.replaced(np.pad(found, [(0, 0), (0, 3 - found.shape[1])]))
@@ -167,7 +177,19 @@ def predict(
         work(batch[k : k + _BATCH], nets, passes, sigma) for k in range(0, len(batch), _BATCH)
     ]
     out = np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], kind.components))
+    if guarded and kind.harm is not None:
+        out = np.stack([_harmless(*pair, kind.harm) for pair in zip(batch, out, strict=True)])
     return out[0] if points.ndim == 3 else out
+
+
+def _harmless(surface: Array, result: Array, harm: Callable[[Array], float]) -> Array:
+    """Return a result, moved less far where it would do harm."""
+    allowed = harm(surface)
+    for factor in _FACTORS:
+        moved = surface + factor * (result - surface)
+        if harm(moved) <= allowed:
+            return result if factor == 1.0 else moved
+    return np.array(surface, dtype=np.float64)
 
 
 def _is_mesh(surface: object) -> bool:

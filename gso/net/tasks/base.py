@@ -47,6 +47,9 @@ class NetTask:
         Whether a net can be trained on the results of another net of the task.
     displacement : float
         Typical displacement, in radii of the unit ball.
+    harm : callable, optional
+        ``harm(surface)``, for arrays (H, W, 3): a number that no result may raise above that of
+        the input.
     """
 
     name: str
@@ -60,6 +63,7 @@ class NetTask:
     warm_start: bool = True
     refines: bool = False
     displacement: float = 0.01
+    harm: Callable[[Array], float] | None = None
 
     @property
     def flat(self) -> bool:

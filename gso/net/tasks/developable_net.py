@@ -54,6 +54,11 @@ def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     return lambda result: {name: term / scale for name, term in whole.parts(result, eps).items()}
 
 
+def harm(surface: Array) -> float:
+    """Return mean |K| in the worse split of the quads, 1/size^2."""
+    return float(metrics.loss_gc_worst(surface))
+
+
 TASK = NetTask(
     name="developable",
     components=3,
@@ -63,4 +68,5 @@ TASK = NetTask(
     terms=("in", "fair", "gc", "loss_gc", "k_left", "d_h", "fair_ratio", "label"),
     energy=energy,
     refines=True,
+    harm=harm,
 )
