@@ -12,8 +12,7 @@ import gso
 from gso import IsometryOptions as JointOptions
 from gso import MeshError, OptionError, WeightsError, hybrid, tno
 from gso.hierarchy import resample
-from gso.hybrid import net_saves_time, two_starts
-from gso.hybrid.time_model import expected as expected_times
+from gso.hybrid import better_start, expected_seconds, net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
 from gso.parametrization import as_patch
@@ -699,7 +698,7 @@ def test_where_a_net_pays(measurements, size, keywords, many, expected):
 def test_measured_times_rise_with_the_size():
     for preset in ("balanced", "accurate"):
         cold, _ = zip(
-            *(expected_times(preset, n) for n in (2000, 5000, 20_000, 100_000)), strict=True
+            *(expected_seconds(preset, n) for n in (2000, 5000, 20_000, 100_000)), strict=True
         )
         assert list(cold) == sorted(cold)
 
@@ -733,12 +732,12 @@ def test_the_better_of_two_starts_is_refined(surfaces):
     options = gso.DevelopableOptions()
     cold = tno.optimize(design, verdict=False)
     for points, source in ((cold.mesh.vertices, "net"), (design.vertices * [1, 1, 1.3], "cold")):
-        start = two_starts.refined(design, points, 64, options, tno.optimize)
+        start = better_start(design, points, 64, options, tno.optimize)
         assert (start.resolution, start.solved) == (40, True)
         result = tno.optimize(design, x0=start, verdict=False)
         assert energy(result) <= 1.01 * energy(cold), source
     small = Mesh.from_grid(saddle(19))
-    assert two_starts.refined(small, small.vertices, 64, options, tno.optimize) is None
+    assert better_start(small, small.vertices, 64, options, tno.optimize) is None
 
 
 def test_less_may_be_left_with_more_effort(surfaces, coarse_net):

@@ -19,8 +19,8 @@ from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
-from gso.hybrid import two_starts
 from gso.hybrid.time_model import net_saves_time
+from gso.hybrid.two_starts import better_start
 from gso.hybrid.warm_start import Prediction, predictions
 from gso.io import as_mesh
 from gso.mesh import Mesh
@@ -373,9 +373,9 @@ def _start(
     if large and isinstance(options, DevelopableOptions):
         more = {k: v for k, v in keywords.items() if k in ("formulation", "terms")}
         solve = partial(optimize, task=task, **more)
-        better = two_starts.refined(design, points, SIZE, options, solve)
-        if better is not None:
-            return replace(better, guarded=True, remaining=left)
+        lower = better_start(design, points, SIZE, options, solve)
+        if lower is not None:
+            return replace(lower, guarded=True, remaining=left)
     return start
 
 

@@ -45,12 +45,12 @@ def net_saves_time(design: Mesh, task: str, keywords: Keywords, *, many: bool = 
     preset = _PRESETS.get(getattr(request.options, "variables", ""))
     if preset is None:
         return False
-    cold, warm = expected(preset, len(design.vertices))
+    cold, warm = expected_seconds(preset, len(design.vertices))
     load = 0.0 if many else float(measured()["load"])
     return warm + load <= _TIME * cold
 
 
-def expected(preset: str, vertices: int) -> tuple[float, float]:
+def expected_seconds(preset: str, vertices: int) -> tuple[float, float]:
     """Return the expected seconds of a cold solve and of one from a net's result.
 
     Times are interpolated in proportion to powers of the number of vertices. The second is infinite

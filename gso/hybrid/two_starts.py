@@ -20,7 +20,7 @@ from gso.typing import Array
 _LOOSE = 1e-3
 
 
-def refined(
+def better_start(
     design: Mesh,
     points: Array,
     resolution: int,
