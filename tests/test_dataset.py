@@ -103,7 +103,7 @@ class TestScreen:
             assert min(counts[: len(counts) - beyond + 1]) > 0, name
 
     def test_all_features_of_the_paper_get_their_shares(self):
-        count = 100
+        count = 200
         chosen = screen.select(count, 0, seed=5, strata="features")
         found = self.features(5, chosen.main)
         values = np.column_stack([found["K_A"], found["sigma2"], found["K_P"] / found["K_A"]])
@@ -111,7 +111,7 @@ class TestScreen:
         there = np.histogramdd(values, edges)[0]
         np.testing.assert_array_equal(there.ravel(), screen.quotas(count, "features"))
         # Flat to strongly curved surfaces of either sign, and mixed ones, in every split.
-        for part in np.split(values, [50]):
+        for part in np.split(values, [100]):
             counts = np.histogram(part[:, 2], screen.BALANCE)[0] / len(part)
             np.testing.assert_allclose(counts, screen.BALANCE_SHARES, atol=0.05)
             assert part[:, 0].mean() == pytest.approx(0.307, abs=0.03)
