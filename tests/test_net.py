@@ -596,14 +596,16 @@ class TestMeshes:
             found = predict(surface, model=coarse)
             np.testing.assert_allclose(found.vertices, expected, atol=1e-6)
 
-    def test_triangles_move_as_the_grid_does(self, coarse):
+    def test_triangles_move_as_the_grid_does(self):
         points = saddle(30)
         mesh, order = triangles(points)
         assert mesh.grid is None
-        moved = predict(mesh, model=coarse).vertices - mesh.vertices
+        # A trained net: what a random one makes of a surface depends on its grid.
+        moved = predict(mesh).vertices - mesh.vertices
         # The map to a rectangle differs from the grid: so does the result, by a part of it.
-        expected = (predict(points, model=coarse) - points).reshape(-1, 3)[order]
+        expected = (predict(points) - points).reshape(-1, 3)[order]
         assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(expected), rel=0.5)
+        assert np.linalg.norm(moved - expected) < 0.3 * np.linalg.norm(expected)
 
     def test_a_flat_image_lies_in_the_plane(self):
         mesh, _ = triangles(cylinder(24))
