@@ -42,7 +42,8 @@ class Plugins:
         self._broken: set[EntryPoint] = set()
 
     def _points(self) -> dict[str, EntryPoint]:
-        found = {point.name: point for point in _entry_points(self.group, tuple(sys.path))}
+        every = _entry_points(tuple(sys.path)).select(group=self.group)
+        found = {point.name: point for point in every}
         return {name: point for name, point in found.items() if point not in self._broken}
 
     def names(self) -> list[str]:
@@ -87,13 +88,13 @@ class Plugins:
                 yield name, found
 
 
-@lru_cache(maxsize=64)
-def _entry_points(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group in the folders of `path`, that of ``sys.path``."""
-    # Imported here, as it is slow.
+@lru_cache(maxsize=8)
+def _entry_points(path: tuple[str, ...]) -> Any:
+    """Search the folders of `path`, that of ``sys.path``, for entry points: once for all groups."""
+    # Imported here, as it is slow. What it returns has another class from Python 3.12 on.
     from importlib.metadata import entry_points
 
-    return tuple(entry_points(group=group))
+    return entry_points()
 
 
 def lacks(*members: str) -> Callable[[Any], str]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from gso.geometry import area_vectors
 from report.method import Array, Method, Solved, combinations
 from report.surfaces import Case
 
@@ -57,10 +58,9 @@ def bilateral(case: Case, steepness: float, passes: int, updates: int) -> Solved
 
 def _faces(points: Array, faces: Array) -> tuple[Array, Array, Array]:
     """Return areas, unit normals and centroids of triangles."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    size = np.maximum(np.linalg.norm(cross, axis=1), 1e-300)
-    return 0.5 * size, cross / size[:, None], (a + b + c) / 3.0
+    vectors = area_vectors(points, faces)
+    size = np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)
+    return 0.5 * size, vectors / size[:, None], points[faces].mean(axis=1)
 
 
 METHODS = [

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from gso.geometry import area_vectors
 from report.method import Array, Method, Solved, combinations
 from report.surfaces import Case
 
@@ -60,9 +61,8 @@ def thinned(case: Case, rings: int, iterations: int, closeness: float) -> Solved
 
 
 def _normals(points: Array, faces: Array) -> Array:
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
+    vectors = area_vectors(points, faces)
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 def _cotangents(points: Array, faces: Array) -> tuple[Array, Array]:

@@ -195,13 +195,14 @@ def model(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     """
     presets: dict[str, list[dict[str, float]]] = {preset: [] for preset in SIZES}
     for (grid, preset), found in _by_size(n, data, "validation").items():
-        high = {name: float(np.quantile(found[name], 0.9)) for name in ("energy", "strain")}
         row = {
-            "vertices": int(grid.split(" ")[0]) ** 2,
-            "cold": float(np.median(found["cold total"])),
-            "net": float(np.median(found["hybrid total"])),
+            "cold": np.median(found["cold total"]),
+            "net": np.median(found["hybrid total"]),
+            "energy": np.quantile(found["energy"], 0.9),
+            "strain": np.quantile(found["strain"], 0.9),
         }
-        presets[preset].append({k: float(f"{v:.4g}") for k, v in (row | high).items()})
+        size = {"vertices": int(grid.split(" ")[0]) ** 2}
+        presets[preset].append(size | {k: float(f"{v:.4g}") for k, v in row.items()})
     runs = [timed(subprocess.run, [sys.executable, "-c", LOAD], check=True)[1] for _ in range(3)]
     load = round(min(runs), 2)
     write_json(time_model.FILE, {"load": load, "presets": presets})

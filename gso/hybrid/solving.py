@@ -19,6 +19,7 @@ from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
+from gso.hybrid.plain_solve import checked_request, plain_options
 from gso.hybrid.time_model import net_saves_time
 from gso.hybrid.two_starts import better_start
 from gso.hybrid.warm_start import Prediction, predictions
@@ -32,7 +33,6 @@ from gso.pipeline.normalise import Canonical
 from gso.quantities import as_length, as_positive
 from gso.result import Result
 from gso.status import Progress, Status
-from gso.tasks.developable import Options as DevelopableOptions
 from gso.tno import Start, check, optimize
 from gso.typing import Array, Keywords, MeshLike
 
@@ -291,8 +291,7 @@ def _checked(task: str, polish: bool | int, keywords: Keywords) -> bool | int:
     signature(optimize).bind(None, **keywords)
     if "x0" in keywords:
         raise OptionError("the net makes the start; for one of your own call gso.tno.optimize")
-    names = ("formulation", "options", "max_deviation", "max_strain", "target_curvature", "terms")
-    check(task, **{name: keywords[name] for name in names if name in keywords})
+    checked_request(task, keywords)
     polish = bool(polish) if isinstance(polish, bool | np.bool_) else int(polish)
     for name in ("max_strain", "target_curvature"):
         if polish is not True and keywords.get(name) is not None:
@@ -358,24 +357,20 @@ def _start(
     keywords: Keywords,
 ) -> Start:
     """Return the start that a net's result makes."""
-    options = check(task, keywords.get("formulation"), keywords.get("options")).options
-    limits = ("max_deviation", "max_strain", "target_curvature")
-    bound = keywords["constraints"] or any(keywords.get(name) is not None for name in limits)
-    plain = isinstance(options, DevelopableOptions) and options.variables in ("normal", "free")
-    if polish is not True or not plain or bound or design.grid_shape is None:
+    options = plain_options(design, task, keywords) if polish is True else None
+    if options is None or design.grid_shape is None:
         # Without iterations the net's result itself is wanted, whatever its energy.
         most = None if polish is True else int(polish)
         guarded = polish is not False
         return Start(points, "net", guarded=guarded, iterations=most, tolerance=_NEARLY)
-    left = _LEFT[effort >= 1.0]
-    start = Start(points, "net", guarded=True, remaining=left, resolution=SIZE)
-    large = max(design.grid_shape) >= _TWO_STARTS[effort >= 1.0] * SIZE
-    if large and isinstance(options, DevelopableOptions):
+    careful = effort >= 1.0
+    start = Start(points, "net", guarded=True, remaining=_LEFT[careful], resolution=SIZE)
+    if max(design.grid_shape) >= _TWO_STARTS[careful] * SIZE:
         more = {k: v for k, v in keywords.items() if k in ("formulation", "terms")}
         solve = partial(optimize, task=task, **more)
         lower = better_start(design, points, SIZE, options, solve)
         if lower is not None:
-            return replace(lower, guarded=True, remaining=left)
+            return replace(lower, guarded=True, remaining=_LEFT[careful])
     return start
 
 

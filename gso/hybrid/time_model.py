@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gso.hybrid.plain_solve import plain_options
 from gso.mesh import Mesh
-from gso.tno import check
 from gso.typing import Array, Json, Keywords
 
 #: Measurements, which ``python bench/run_all.py --only hybrid.model`` makes anew.
@@ -35,16 +35,10 @@ def net_saves_time(design: Mesh, task: str, keywords: Keywords, *, many: bool = 
     many : bool
         Whether it is one of many designs, for which PyTorch is loaded once.
     """
-    request = check(task, keywords.get("formulation"), keywords.get("options"))
-    by_curvature = (task, request.formulation) == ("developable", "curvature")
-    if not by_curvature or design.grid_index is None:
+    options = plain_options(design, task, keywords)
+    if options is None:
         return False
-    bounds = ("max_deviation", "max_strain", "target_curvature")
-    if any(keywords.get(name) is not None for name in bounds) or keywords.get("constraints"):
-        return False
-    preset = _PRESETS.get(getattr(request.options, "variables", ""))
-    if preset is None:
-        return False
+    preset = _PRESETS[options.variables]
     cold, warm = expected_seconds(preset, len(design.vertices))
     load = 0.0 if many else float(measured()["load"])
     return warm + load <= _TIME * cold

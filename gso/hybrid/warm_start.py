@@ -135,15 +135,14 @@ def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
     MeshError
         The design is too small for a net, or cannot be resampled.
     """
+    kind, count = tasks.get(task), int(design.used.sum())
     if design.grid is not None:
-        if min(design.grid.shape[:2]) < _SMALLEST:
-            height, width = design.grid.shape[:2]
+        height, width = design.grid.shape[:2]
+        if min(height, width) < _SMALLEST:
             raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
-        return grid_of(design, tasks.get(task))
-    count = int(design.used.sum())
-    if count < _SMALLEST**2 and not tasks.get(task).noisy:
+    elif count < _SMALLEST**2 and not kind.noisy:
         raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")
-    return grid_of(design, tasks.get(task))
+    return grid_of(design, kind)
 
 
 def _check_curvature(grid: Array) -> None:

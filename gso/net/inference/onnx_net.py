@@ -15,6 +15,7 @@ from gso.errors import OptionError, WeightsError
 from gso.hierarchy import resample
 from gso.net import tasks
 from gso.net.catalogue import SIZE, modified, verified
+from gso.parametrization import rectangle
 from gso.typing import Array, Json
 from gso.unknowns.spline import spline_matrix
 
@@ -44,8 +45,8 @@ class OnnxNet:
     def start(self, unit: Array) -> Array:
         if not self._flat:
             return unit
-        sides = np.stack(geometry.side_lengths(tuple(np.moveaxis(unit, -1, 0))), axis=-1)
-        return np.asarray((geometry.unit_rectangle(*unit.shape[1:3]) - 0.5) * sides[:, None, None])
+        flat = np.stack([rectangle(grid) for grid in unit])
+        return np.asarray(flat - flat.mean(axis=(1, 2), keepdims=True))
 
     def displacements(self, seen: Array, unit: Array, noise: Array | None, passes: int) -> Array:
         if passes != self.passes:

@@ -41,8 +41,8 @@ class NetTask:
         Whether inputs have noise and labels are the surfaces without it. The loss "clean" takes
         the place of "label" and "energy".
     warm_start : bool
-        Whether the optimiser can start from a result. If not, the optimiser's method is in
-        closed form.
+        Whether the optimiser can start from a result, and gains by it. It does not where its
+        method is in closed form, or its own start is as good.
     refines : bool
         Whether a net can be trained on the results of another net of the task.
     displacement : float

@@ -90,8 +90,8 @@ def levels(analysis: Analysis, request: Request[Options]) -> list[Level]:
     """
     mesh, constraints = analysis.mesh, analysis.constraints
     start = request.x0
-    begun = start is not None
     own = Level(mesh, mesh if start is None else mesh.replaced(start), constraints)
+    begun = start is not None
     free = constraints.empty
     if begun and (request.max_displacement is not None or mesh.grid_index is None or not free):
         return [own]

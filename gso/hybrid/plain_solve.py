@@ -1,0 +1,41 @@
+"""The solves that warm starts are made and measured for."""
+
+from __future__ import annotations
+
+from gso.mesh import Mesh
+from gso.tasks.developable import Options
+from gso.tasks.options import Options as BaseOptions
+from gso.tasks.request import Request
+from gso.tno import check
+from gso.typing import Keywords
+
+#: Arguments of :func:`gso.tno.optimize` that do not depend on the mesh.
+_ASKED = ("formulation", "options", "max_deviation", "max_strain", "target_curvature", "terms")
+#: Kinds of unknowns of such solves.
+_VARIABLES = ("normal", "free")
+
+
+def checked_request(task: str, keywords: Keywords) -> Request[BaseOptions]:
+    """Check what a solve is asked for, as far as that does not depend on the mesh.
+
+    Raises
+    ------
+    OptionError, BackendError
+        As :func:`gso.tno.check`.
+    """
+    return check(task, **{name: keywords[name] for name in _ASKED if name in keywords})
+
+
+def plain_options(design: Mesh, task: str, keywords: Keywords) -> Options | None:
+    """Return the settings of a developable solve of a grid by curvature, without limits.
+
+    None for other solves: by other formulations, of other meshes, under constraints, or for the
+    control points of splines.
+    """
+    request = checked_request(task, keywords)
+    options = request.options
+    if not isinstance(options, Options) or options.variables not in _VARIABLES:
+        return None
+    if design.grid_index is None or request.limits.given or keywords.get("constraints"):
+        return None
+    return options
