@@ -40,6 +40,8 @@ _NEARLY = 1.15
 _FAR, _ENOUGH, _ALL = 2.3, 3, 0.95
 #: How often a division is solved again from where it is, and the largest ratio of its excess.
 _PURSUITS, _LESS = 3, 0.97
+#: Excess up to which a finer division is solved again before it is divided further.
+_BARELY = 1.05
 #: Distance over the allowed one, and number of pieces, from which on a search is in vain.
 _HOPELESS, _MANY = 20.0, 150
 #: Number of pieces for each feature from which on seams along its creases are tried.
@@ -216,8 +218,11 @@ def _refined(search: CopySearch, trial: Trial, others: int, most: float = _FEW) 
             break
         possible = effort.divisions - len(found) - 1 + others + effort.merges
         search.remaining.of_copy(f"seams and shape: {label.max() + 1} pieces", possible)
-        trial = search.measured(label, begin=trial)
-        found.append(trial)
+        found.append(search.measured(label, begin=trial))
+        if 1.0 < found[-1].worst <= _BARELY:
+            # So little is missing that another solve is likely to do.
+            found += _pursued(search, found[-1])
+        trial = found[-1]
     return found
 
 
