@@ -436,7 +436,7 @@ def test_labels_are_learnt(tmp_path, folder):
     for task, label in (("developable", "developable"), ("flatten", "strain")):
         phase = [{"loss": "label", "batch": 8, "rate": 5e-3}]
         made = config(task, label=label, phase=phase, steps=60, augment="none", fresh=2)
-        assert len(open_source(made, tmp_path / "set", tmp_path / "fresh.npy").surfaces) == 10
+        assert len(open_source(made, tmp_path / "set", tmp_path).surfaces) == 10
         train(made, tmp_path / "set", tmp_path / task)
         rows = [r["loss"] for r in read_curves(tmp_path / task) if "loss" in r]
         assert rows[-1] < 0.9 * rows[0]

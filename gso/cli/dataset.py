@@ -50,6 +50,12 @@ def dataset() -> None:
     help="What is stratified: K_A and sigma^2, or all features of the paper.",
 )
 @click.option(
+    "--surfaces",
+    default="bezier",
+    type=click.Choice(["bezier", "broad"]),
+    help="The published ones, or families of other surfaces, held out in validation and test.",
+)
+@click.option(
     "--reference",
     multiple=True,
     type=click.Choice(["jiang2020"]),
@@ -78,6 +84,7 @@ def build(
     size: int,
     extras: bool,
     strata: str,
+    surfaces: str,
     **given: Any,
 ) -> None:
     """Build a dataset of surfaces in the folder DIR.
@@ -93,7 +100,7 @@ def build(
     if "none" in labels and len(labels) > 1:
         raise OptionError("--label none goes with no other label")
     labels = () if labels == ("none",) else labels
-    recipe = sets.Recipe(n, seed, size, labels, extras, strata)
+    recipe = sets.Recipe(n, seed, size, labels, extras, strata, surfaces)
     start = time.perf_counter()
     with closing(progress.Counts()) as bars:
         data = sets.build(out, recipe, tick=bars.tick, **given)

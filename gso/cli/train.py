@@ -35,6 +35,7 @@ _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 @click.option("--epochs", metavar="N", type=int, help="Passes over the surfaces, instead of steps.")
 @click.option("--seed", metavar="N", type=int, help="Seed of all random numbers.")
 @click.option("--fresh", metavar="N", type=int, help="Surfaces to draw beside those of the set.")
+@click.option("--broad", metavar="N", type=int, help="Surfaces of the broad set to learn from.")
 @click.option("--sigma", metavar="S", type=float, help="denoise: the only noise to train for.")
 @click.option("--init", metavar="NET", help="Net to begin with.")
 @click.option("--through", metavar="NET", help="Net whose results take the surfaces' place.")

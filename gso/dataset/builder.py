@@ -124,13 +124,7 @@ def build(
         _check_same(place, record, "versions", versions(device), _OTHER_VERSIONS)
         wanted |= manifest.pairs(record)
         with blas_threads(1):
-            selection = select(
-                recipe.n,
-                recipe.splits["hard"],
-                seed=recipe.seed,
-                strata=recipe.strata,
-                tick=partial(tick, "surfaces drawn"),
-            )
+            selection = None if recipe.broad else _selected(recipe, tick)
         everything = list(tasks(recipe, selection, wanted))
         for part in (shard.LABELS, *REFERENCES):
             todo = [task for task in everything if task.part == part]
@@ -142,20 +136,33 @@ def build(
                 )
                 _make(place, work, todo, set(bad), executor, tick)
         with _kept():
-            record = _listed(place, record, recipe, everything, wanted, selection.drawn)
+            drawn = recipe.n if selection is None else selection.drawn
+            record = _listed(place, record, recipe, everything, wanted, drawn)
             record["summary"] = summarise(Dataset(place, record))
             manifest.write(place, record | {"complete": True})
     return Dataset(place)
 
 
+def _selected(recipe: Recipe, tick: Tick) -> Selection:
+    return select(
+        recipe.n,
+        recipe.splits["hard"],
+        seed=recipe.seed,
+        strata=recipe.strata,
+        tick=partial(tick, "surfaces drawn"),
+    )
+
+
 def tasks(
-    recipe: Recipe, selection: Selection, references: Iterable[tuple[str, str]]
+    recipe: Recipe, selection: Selection | None, references: Iterable[tuple[str, str]]
 ) -> Iterator[shard.Task]:
-    """Yield one task per file of a dataset."""
+    """Yield one task per file of a dataset; the broad set has no selection."""
     first = 0
     asked = set(references)
     for split, count in recipe.splits.items():
-        if split == "hard":
+        if selection is None:
+            ids = list(range(count))
+        elif split == "hard":
             ids = selection.hard.tolist()
         elif first < recipe.n:
             ids = selection.main[first : first + count].tolist()

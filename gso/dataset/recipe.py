@@ -18,6 +18,8 @@ VERSION = 2
 #: Number of surfaces of the published set, and of its validation and test splits here.
 PUBLISHED = 10401
 _VALIDATION, _TEST = 1040, 1041
+#: Kinds of surfaces.
+SURFACES = ("bezier", "broad")
 #: Size of the split "hard" relative to `Recipe.n`.
 _HARD = 0.1
 #: Packages whose version may change the last digits of labels.
@@ -43,6 +45,9 @@ class Recipe:
     strata : {"curvature", "features"}
         Features whose intervals get fixed shares of the set: "curvature", K_A and sigma^2;
         "features", K_P, K_N, K_A and sigma^2, as in the paper. See :mod:`gso.dataset.screen`.
+    surfaces : {"bezier", "broad"}
+        "bezier": the published surfaces. "broad": those of :mod:`gso.dataset.broad`, whose
+        families differ between the splits. These are not stratified, and `extras` adds nothing.
 
     Raises
     ------
@@ -56,6 +61,7 @@ class Recipe:
     labels: tuple[str, ...] = LABELS
     extras: bool = True
     strata: str = STRATA[0]
+    surfaces: str = SURFACES[0]
 
     def __post_init__(self) -> None:
         for name, least in (("n", 10), ("seed", 0), ("size", 16)):
@@ -64,12 +70,21 @@ class Recipe:
                 raise OptionError(f"{name} is {value!r}; it must be an integer, {least} or more")
         if self.strata not in STRATA:
             raise OptionError(f"strata is {self.strata!r}; {choices(self.strata, STRATA)}")
+        if self.surfaces not in SURFACES:
+            raise OptionError(f"surfaces is {self.surfaces!r}; {choices(self.surfaces, SURFACES)}")
+        if self.broad and self.strata != STRATA[0]:
+            raise OptionError(f"the broad set is not stratified; leave out strata={self.strata!r}")
         object.__setattr__(self, "labels", tuple(self.labels))
         unknown = [k for k in self.labels if k not in LABELS]
         if unknown or len(set(self.labels)) < len(self.labels):
             raise OptionError(
                 f"labels are {', '.join(self.labels)}; take {', '.join(LABELS)}, each once at most"
             )
+
+    @property
+    def broad(self) -> bool:
+        """Whether its surfaces are those of the broad set."""
+        return self.surfaces == "broad"
 
     @property
     def splits(self) -> dict[str, int]:
@@ -81,15 +96,18 @@ class Recipe:
         validation = round(self.n * _VALIDATION / PUBLISHED)
         test = round(self.n * _TEST / PUBLISHED)
         sizes = {"train": self.n - validation - test, "validation": validation, "test": test}
+        if self.broad:
+            return sizes
         sizes["hard"] = round(_HARD * self.n)
         return sizes | (dict.fromkeys(shapes.NAMES, shapes.COUNT) if self.extras else {})
 
     def as_dict(self) -> Json:
         """Return the recipe, its version and the solver's settings, for a manifest."""
         given = asdict(self)
-        if self.strata == STRATA[0]:
-            # Sets that were made before there was a choice have no entry, and are the same.
-            del given["strata"]
+        # Sets that were made before there was a choice have no entry, and are the same.
+        for name, known in (("strata", STRATA), ("surfaces", SURFACES)):
+            if given[name] == known[0]:
+                del given[name]
         return {
             "version": VERSION,
             **given,

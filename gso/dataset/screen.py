@@ -120,7 +120,7 @@ def select(
             raise DatasetError(f"{start} draws of seed {seed} did not fill the intervals")
         numbers = np.arange(start, start + _BLOCK)
         points = sample_many([surface(seed, int(k)) for k in numbers], SIZE)
-        good = np.flatnonzero(_sound(points))
+        good = np.flatnonzero(sound(points))
         cell = _cell(features(points[good]), strata)
         taken = _rank(cell) < room[cell]
         room -= np.bincount(cell[taken], minlength=len(room))
@@ -184,7 +184,7 @@ def _rounded(shares: Array, count: int) -> Ints:
     return whole
 
 
-def _sound(points: Array) -> Flags:
+def sound(points: Array) -> Flags:
     """Tell which grids are finite and have no degenerate cell."""
     a = metrics.components(points[:, 1:, 1:] - points[:, :-1, :-1])
     b = metrics.components(points[:, :-1, 1:] - points[:, 1:, :-1])

@@ -6,6 +6,9 @@ import enum
 
 import numpy as np
 
+#: A random generator.
+RNG = np.random.Generator
+
 
 class Stream(enum.IntEnum):
     """Purposes of random numbers; the values are part of the recipe."""
@@ -14,6 +17,7 @@ class Stream(enum.IntEnum):
     NOISE = 1
     SPLIT = 2
     SHAPES = 3
+    BROAD = 4
 
 
 def generator(seed: int, stream: Stream, *key: int) -> np.random.Generator:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso.dataset import bezier, labels, noise, screen, shapes
+from gso.dataset import bezier, broad, labels, noise, screen, shapes
 from gso.dataset.hdf import pack
 from gso.dataset.recipe import Recipe, versions
 from gso.errors import DatasetError
@@ -103,6 +103,8 @@ def make(
             "surface": points,
             "features": screen.features(screened),
         }
+        if recipe.broad:
+            arrays["family"] = np.array([broad.family(task.split, k) for k in task.ids], "S32")
         if task.split == noise.SPLIT:
             arrays["noise"] = noise.draw(recipe.seed, task.ids, recipe.size)
         for kind in recipe.labels:
@@ -113,6 +115,8 @@ def make(
 def surfaces(recipe: Recipe, split: str, ids: tuple[int, ...], size: int | None = None) -> Array:
     """Regenerate grids (b, size, size, 3) of a split, in the unit ball, from the seed."""
     size = recipe.size if size is None else size
+    if recipe.broad:
+        return np.stack([broad.draw(split, k, seed=recipe.seed, size=size) for k in ids])
     if split in shapes.NAMES:
         return shapes.sample(split, seed=recipe.seed, size=size)[list(ids)]
     return bezier.sample_many([screen.surface(recipe.seed, k) for k in ids], size)

@@ -46,7 +46,8 @@ def export(model: AnyPath | Net, path: AnyPath, *, passes: int | None = None) ->
     ``displacements`` (batch, 64, 64, d) is to be added to the surface, or to its Flatten-init
     (:func:`gso.parametrization.rectangle`, centred at the origin). A :class:`gso.net.CoarseNet`
     also has ``coarse`` (batch, d, 16, 16) and ``fine`` (batch, d, 32, 32), the coefficients of
-    its spline fields. The size of the batch is free. The operators are those of opset 18.
+    its spline fields, and with a confidence ``confidence`` (batch, 1, 16, 16), the coefficients of
+    its logarithmic odds. The size of the batch is free. The operators are those of opset 18.
 
     :func:`gso.net.predict` takes the file as its `model`.
 

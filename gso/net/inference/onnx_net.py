@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import onnxruntime
+from scipy.special import expit
 
 from gso import geometry
 from gso.errors import OptionError, WeightsError
@@ -59,9 +60,11 @@ class OnnxNet:
         if seen.shape == unit.shape or "coarse" not in self._outputs:
             (moved,) = self._session.run(["displacements"], feed)
             return np.stack([resample(v, *unit.shape[1:3]) for v in moved.astype(np.float64)])
-        fields = [f.astype(np.float64) for f in self._session.run(["coarse", "fine"], feed)]
-        first, second = (_evaluated(field, *unit.shape[1:3]) for field in fields)
-        parts = tuple(np.moveaxis(first + second, 1, 0))
+        names = [name for name in self._outputs if name != "displacements"]
+        fields = [f.astype(np.float64) for f in self._session.run(names, feed)]
+        first, second, *trust = (_evaluated(field, *unit.shape[1:3]) for field in fields)
+        moved = (first + second) * expit(trust[0]) if trust else first + second
+        parts = tuple(np.moveaxis(moved, 1, 0))
         if not self._flat:
             parts = geometry.GridFrame.of(tuple(np.moveaxis(unit, -1, 0))).vectors(*parts)
         return np.stack(parts, axis=-1)

@@ -86,6 +86,7 @@ class Net(nn.Module):
         It is :meth:`displacements` and, if they are spline fields, the fields' coefficients
         "coarse" and "fine" (B, d, n, m) in radii of the unit ball: components along the axes
         of the flat image, or along normal, rows and columns of :class:`gso.geometry.GridFrame`.
+        Nets with a confidence also return its coefficients (B, 1, n, m).
         """
         return (self.displacements(surface, sigma, passes=passes),)
 

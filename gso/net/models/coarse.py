@@ -13,6 +13,11 @@ from gso.net.models.blocks import Residual
 from gso.net.models.grid_geometry import Frame, planes, points
 from gso.net.models.resampling import spline_field
 
+#: Coefficients of the fields, or numbers where all are equal.
+Fields = tuple[Tensor | float, ...]
+#: Logarithmic odds of a net's confidence before it is trained: moves are nearly whole.
+_CONFIDENT = 3.0
+
 
 class CoarseNet(Net):
     """Displacements as bicubic B-splines with few coefficients: smooth by construction.
@@ -22,6 +27,10 @@ class CoarseNet(Net):
     half the resolution of the vertices, predicts a coarser and a finer field. The coefficients
     are components along the surface's normals and grid lines (for flat images, along the axes
     of the rectangle), so the result is equivariant under rotations of the input.
+
+    With `confidence` a third field says how far the net trusts its displacements: each vertex
+    moves by the displacement times a number between 0 and 1, so that the input stays where the
+    net has learned to leave it.
 
     Parameters
     ----------
@@ -34,6 +43,8 @@ class CoarseNet(Net):
         one more on the way up.
     passes : int
         How often the net is applied, with the same weights, to its previous result.
+    confidence : bool
+        Whether displacements are multiplied by a confidence per vertex.
 
     Raises
     ------
@@ -56,6 +67,7 @@ class CoarseNet(Net):
         widths: tuple[int, int, int] = (32, 64, 128),
         depths: tuple[int, int, int] = (1, 1, 4),
         passes: int = 3,
+        confidence: bool = False,
     ):
         sound = len(widths) == len(depths) == 3 and all(4 <= w <= 512 for w in widths)
         if not sound or not all(0 <= d <= 32 for d in depths) or not 1 <= passes <= 8:
@@ -63,7 +75,8 @@ class CoarseNet(Net):
                 f"widths {widths}, depths {depths}, passes {passes}: take three widths from 4 to "
                 "512, three depths up to 32, 1 to 8 passes"
             )
-        super().__init__(task, widths=list(widths), depths=list(depths), passes=passes)
+        settings = {"widths": list(widths), "depths": list(depths), "passes": passes}
+        super().__init__(task, **settings, confidence=bool(confidence))
         if self.kind.noisy:
             raise OptionError("a coarse field cannot follow noise; take kind 'gsonet'")
         self.passes, self.unit = passes, self.kind.displacement
@@ -86,23 +99,36 @@ class CoarseNet(Net):
         self.from_middle = nn.Conv2d(w[1], w[0], 1)
         self.fine_out = blocks(w[0], d[0] + 1)
         self.coarse_head, self.fine_head = (nn.Conv2d(n, dim, 3, padding=1) for n in (w[1], w[0]))
-        for head in (self.coarse_head, self.fine_head):
+        heads = [self.coarse_head, self.fine_head]
+        if confidence:
+            self.confidence_head = nn.Conv2d(w[1], 1, 3, padding=1)
+            heads.append(self.confidence_head)
+            self.EXPORTED_OUTPUTS = (*self.EXPORTED_OUTPUTS, "confidence")
+        self.confident = bool(confidence)
+        for head in heads:
             nn.init.zeros_(head.weight)
             nn.init.zeros_(head.bias)  # type: ignore[arg-type]
 
+    def copy_weights_from(self, other: Net) -> None:
+        new = {k: v for k, v in self.state_dict().items() if k.startswith("confidence_head")}
+        self.load_state_dict(
+            {**new, **other.state_dict()} if self.confident else other.state_dict()
+        )
+
     def coefficients(
         self, surface: Tensor, frame: Frame, passes: int | None = None
-    ) -> tuple[Tensor, Tensor]:
-        """Compute coefficients (B, d, n, m) of both fields after `passes` (by default all)."""
+    ) -> tuple[Tensor, ...]:
+        """Compute the coefficients (B, d, n, m) of the fields after `passes` (by default all).
+
+        They are those of the coarser and the finer field, and (B, 1, n, m) of the confidence, if
+        the net has one: its logarithmic odds.
+        """
         passes = self.passes if passes is None else passes
         with torch.no_grad():
-            seen, coarse, fine = self._seen(surface, frame, passes - 1)
-        more = self._fields(seen)
-        return coarse + more[0], fine + more[1]
+            seen, fields = self._seen(surface, frame, passes - 1)
+        return _added(fields, self._fields(seen))
 
-    def _seen(
-        self, surface: Tensor, frame: Frame, passes: int
-    ) -> tuple[Tensor, Tensor | float, Tensor | float]:
+    def _seen(self, surface: Tensor, frame: Frame, passes: int) -> tuple[Tensor, Fields]:
         """Return the net's input after some passes, and the sums of their coefficients."""
         p = planes(surface)
         bent = inputs.bending(p, frame)
@@ -110,35 +136,33 @@ class CoarseNet(Net):
         start = self.initial_geometry(surface)
         state = inputs.stretching(frame, planes(start)) if self.kind.flat else bent
         moved = known.new_zeros(known.shape[0], self.kind.components, *known.shape[2:])
-        coarse: Tensor | float = 0.0
-        fine: Tensor | float = 0.0
+        fields: Fields = (0.0, 0.0, _CONFIDENT)[: 2 + self.confident]
         for _ in range(passes):
-            more = self._fields(_joined(known, state, moved / self.unit))
-            coarse, fine = coarse + more[0], fine + more[1]
-            moved = self._shares(coarse, fine, *known.shape[2:])
+            fields = found = _added(fields, self._fields(_joined(known, state, moved / self.unit)))
+            moved = self._shares(found, *known.shape[2:])
             image = planes(start + self._vectors(moved, frame))
             if self.kind.flat:
                 state = inputs.stretching(frame, image)
             else:
                 state = inputs.bending(image, Frame.of(image))
-        return _joined(known, state, moved / self.unit), coarse, fine
+        return _joined(known, state, moved / self.unit), fields
 
-    EXPORTED_OUTPUTS = ("displacements", "coarse", "fine")
+    EXPORTED_OUTPUTS: tuple[str, ...] = ("displacements", "coarse", "fine")
 
     def exported_outputs(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
     ) -> tuple[Tensor, ...]:
         frame = Frame.of(planes(surface))
         fields = self.coefficients(surface, frame, passes)
-        moved = self._vectors(self._shares(*fields, *surface.shape[1:3]), frame)
-        return (moved, *(self.unit * field for field in fields))
+        moved = self._vectors(self._shares(fields, *surface.shape[1:3]), frame)
+        return (moved, *(self.unit * field for field in fields[:2]), *fields[2:])
 
     def displacements(
         self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
     ) -> Tensor:
         frame = Frame.of(planes(surface))
         fields = self.coefficients(surface, frame, passes)
-        return self._vectors(self._shares(*fields, *surface.shape[1:3]), frame)
+        return self._vectors(self._shares(fields, *surface.shape[1:3]), frame)
 
     def displacements_at(
         self,
@@ -149,11 +173,11 @@ class CoarseNet(Net):
         passes: int | None = None,
     ) -> Tensor:
         own = Frame.of(planes(surface))
-        first, second = (c.to(fine.dtype) for c in self.coefficients(surface, own, passes))
-        shares = self._shares(first, second, fine.shape[1], fine.shape[2])
+        fields = tuple(c.to(fine.dtype) for c in self.coefficients(surface, own, passes))
+        shares = self._shares(fields, fine.shape[1], fine.shape[2])
         return self._vectors(shares, Frame.of(planes(fine)))
 
-    def _fields(self, seen: Tensor) -> tuple[Tensor, Tensor]:
+    def _fields(self, seen: Tensor) -> tuple[Tensor, ...]:
         x = seen.contiguous(memory_format=torch.channels_last)
         with self.autocast(x.device):
             fine = self.fine_in(self.stem(x))
@@ -162,15 +186,22 @@ class CoarseNet(Net):
             middle = self.middle_out(middle + _enlarged(self.from_body(body), middle))
             fine = self.fine_out(fine + _enlarged(self.from_middle(middle), fine))
         # The heads run in single precision: curvature is sensitive to rounding here.
-        return self.coarse_head(middle.to(seen.dtype)), self.fine_head(fine.to(seen.dtype))
+        middle, fine = middle.to(seen.dtype), fine.to(seen.dtype)
+        found = self.coarse_head(middle), self.fine_head(fine)
+        return (*found, self.confidence_head(middle)) if self.confident else found
 
-    def _shares(self, coarse: Tensor, fine: Tensor, height: int, width: int) -> Tensor:
+    def _shares(self, fields: tuple[Tensor, ...], height: int, width: int) -> Tensor:
         """Evaluate the displacement (B, d, height, width) along the axes of the frames."""
-        both = spline_field(coarse, height, width) + spline_field(fine, height, width)
-        return self.unit * both
+        coarse, fine, *trust = (spline_field(field, height, width) for field in fields)
+        moved = self.unit * (coarse + fine)
+        return moved * torch.sigmoid(trust[0]) if trust else moved
 
     def _vectors(self, shares: Tensor, frame: Frame) -> Tensor:
         return shares.movedim(1, -1) if self.kind.flat else points(frame.vectors(*shares.unbind(1)))
+
+
+def _added(fields: Fields, more: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
+    return tuple(old + new for old, new in zip(fields, more, strict=True))
 
 
 def _joined(known: Tensor, state: list[Tensor], moved: Tensor) -> Tensor:

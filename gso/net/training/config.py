@@ -136,6 +136,9 @@ class Config:
     fresh : int
         Number of additional surfaces drawn by the recipe. They have no labels in the dataset:
         only phases without labels, or with a teacher, use them.
+    broad : int
+        Number of additional surfaces of the broad set's train split (:mod:`gso.dataset.broad`),
+        without labels like `fresh`.
     label : str
         Array of the dataset with the labels.
     augment : {"none", "symmetries", "shear"}
@@ -177,6 +180,7 @@ class Config:
     seed: int = 0
     limit: int = 0
     fresh: int = 0
+    broad: int = 0
     label: str = "developable"
     augment: str = "symmetries"
     sigma: tuple[float, float] = (0.0005, 0.02)
@@ -197,7 +201,7 @@ class Config:
         _choice("augment", self.augment, AUGMENTATIONS)
         _choice("against", self.against, ("seen", "designs"))
         _choice("optimiser", self.optimiser, OPTIMISERS)
-        for name in ("steps", "validate", "limit", "fresh", "seed", "epochs"):
+        for name in ("steps", "validate", "limit", "fresh", "broad", "seed", "epochs"):
             _whole(name, getattr(self, name), int(name in ("steps", "validate")))
         for name in ("ema", "weight_decay", "warm_up", "validate_every", "checkpoint_every"):
             as_positive(getattr(self, name), name, zero=True)

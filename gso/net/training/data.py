@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from gso.dataset import store
-from gso.dataset.drawing import draw_many
+from gso.dataset.drawing import draw_broad, draw_many
 from gso.errors import DatasetError
 from gso.io import replacing
 from gso.net import tasks
@@ -168,7 +169,7 @@ def _order(count: int, epoch: int, seed: int) -> Ints:
 def open_source(
     config: Config, folder: str | Path, cache: Path, tick: Tick | None = None
 ) -> Source:
-    """Load the surfaces of a run: those of the train split, then freshly drawn ones.
+    """Load the surfaces of a run: those of the train split, freshly drawn ones, the broad set's.
 
     Parameters
     ----------
@@ -176,7 +177,7 @@ def open_source(
     folder : path
         Folder of the dataset.
     cache : Path
-        File that stores the freshly drawn surfaces.
+        Folder of the files that keep the drawn surfaces.
     tick : callable, optional
         Progress callback, called with the name of the counted items, the number done and the
         total number.
@@ -197,8 +198,12 @@ def open_source(
         sound = labels.isfinite().all(dim=(1, 2, 3))
         surfaces = torch.cat([surfaces[sound], surfaces[~sound]])
         labels = labels[sound]
-    more = fresh(config.fresh, config.seed, surfaces.shape[1], cache, tick)
-    return Source(torch.cat([surfaces, more]), labels)
+    size = surfaces.shape[1]
+    more = [
+        fresh(config.fresh, config.seed, size, cache / f"fresh-{config.seed}.npy", tick),
+        broad(config.broad, config.seed, size, cache / f"broad-{config.seed}.npy", tick),
+    ]
+    return Source(torch.cat([surfaces, *more]), labels)
 
 
 def fresh(count: int, seed: int, size: int, cache: Path, tick: Tick | None = None) -> Tensor:
@@ -207,8 +212,39 @@ def fresh(count: int, seed: int, size: int, cache: Path, tick: Tick | None = Non
     They are cached in a file, which is replaced if its count or size differs. The seed is not
     checked: the name of the file must identify it.
     """
-    shape = (count, size, size, 3)
-    if not count:
+
+    def draw() -> NDArray[np.float32]:
+        pieces = [(min(_DRAWN, count - k), _seed(seed, _FRESH, k)) for k in range(0, count, _DRAWN)]
+        return draw_many(pieces, size, _told(tick, "surfaces drawn", count))
+
+    return _kept(draw, (count, size, size, 3), cache)
+
+
+def broad(count: int, seed: int, size: int, cache: Path, tick: Tick | None = None) -> Tensor:
+    """Draw surfaces (count, size, size, 3) of the broad set's train split, or load them.
+
+    They are cached as those of :func:`fresh`.
+    """
+
+    def draw() -> NDArray[np.float32]:
+        told = _told(tick, "surfaces of the broad set drawn", count)
+        return draw_broad("train", count, seed=seed, size=size, tick=told)
+
+    return _kept(draw, (count, size, size, 3), cache)
+
+
+def _told(tick: Tick | None, what: str, count: int) -> Callable[[int], None] | None:
+    """Return a callback that takes the number made only."""
+    return None if tick is None else partial(_tell, tick, what, count)
+
+
+def _tell(tick: Tick, what: str, count: int, made: int) -> None:
+    tick(what, made, count)
+
+
+def _kept(draw: Callable[[], NDArray[np.float32]], shape: tuple[int, ...], cache: Path) -> Tensor:
+    """Load an array from a file, or make it and write the file."""
+    if not shape[0]:
         return torch.zeros(shape)
     try:
         kept = np.load(cache, allow_pickle=False)
@@ -216,8 +252,7 @@ def fresh(count: int, seed: int, size: int, cache: Path, tick: Tick | None = Non
             return torch.from_numpy(kept)
     except (OSError, ValueError, EOFError):
         pass
-    pieces = [(min(_DRAWN, count - k), _seed(seed, _FRESH, k)) for k in range(0, count, _DRAWN)]
-    drawn = draw_many(pieces, size, tick and (lambda made: tick("surfaces drawn", made, count)))
+    drawn = draw()
     with replacing(cache) as file:
         np.save(file, drawn, allow_pickle=False)
     return torch.from_numpy(drawn)

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from gso.dataset import store
+from gso.dataset.drawing import draw_broad
 from gso.errors import OptionError
 from gso.net import tasks, weights
 from gso.net.catalogue import located, read_card
@@ -31,6 +32,8 @@ from gso.typing import Json
 CHECKPOINT, MODEL, BEST = "checkpoint.safetensors", "model.safetensors", "best.safetensors"
 #: Seed of the noise that validation adds.
 _NOISE = 7
+#: Surfaces of the recipe for each one of the broad set in validation.
+_FEWER = 4
 #: Number of surfaces per block when the processes apply another net to the surfaces.
 _BLOCK = 64
 
@@ -45,6 +48,7 @@ class Run:
     limit: float | None
     source: Source
     check: tuple[Tensor, Tensor, Tensor | None]
+    elsewhere: Tensor | None
     net: Net
     average: Net
     optimisers: list[torch.optim.Optimizer]
@@ -105,6 +109,10 @@ class Run:
             surfaces, truths, sigma = self.check
             results = applied(self.average.eval(), surfaces, sigma)
             self.figures = mean_figures(self.config.task, truths.double().numpy(), results)
+            if self.elsewhere is not None:
+                results = applied(self.average, self.elsewhere)
+                found = mean_figures(self.config.task, self.elsewhere.double().numpy(), results)
+                self.figures |= {f"broad_{name}": value for name, value in found.items()}
             if self.curves is not None:
                 self.curves.add(self.step, self.spent, **self.figures)
             score = self.figures[tasks.get(self.config.task).score]
@@ -187,13 +195,12 @@ def begin(
     net.bf16 = _fast(here.device) if config.bf16 is None else config.bf16
     average = copy.deepcopy(net).requires_grad_(False)
     average.bf16 = False
-    cache = folder / f"fresh-{config.seed}.npy"
     if here.first:
-        # The first process draws fresh surfaces; the others read them from its cache file.
-        source = open_source(config, data, cache, tick)
+        # The first process draws surfaces; the others read them from its files.
+        source = open_source(config, data, folder, tick)
     here.wait()
     if not here.first:
-        source = open_source(config, data, cache)
+        source = open_source(config, data, folder)
     _sizes_fit(config, net, source)
     run = Run(
         config,
@@ -202,6 +209,7 @@ def begin(
         None if minutes is None else 60.0 * minutes,
         source,
         _validation(config, data),
+        _elsewhere(config, source),
         net,
         average,
         muon.optimisers(net, config.optimiser, config.weight_decay),
@@ -297,6 +305,15 @@ def _validation(config: Config, data: Path) -> tuple[Tensor, Tensor, Tensor | No
     if not tasks.get(config.task).noisy:
         return clean, clean, None
     return noisy(clean, config.sigma, torch.Generator().manual_seed(_NOISE))
+
+
+def _elsewhere(config: Config, source: Source) -> Tensor | None:
+    """Return surfaces of the broad set's families for validation, if the run learns from others."""
+    if not config.broad or tasks.get(config.task).noisy or config.through:
+        return None
+    size, count = source.surfaces.shape[1], max(config.validate // _FEWER, 1)
+    drawn = torch.from_numpy(draw_broad("validation", count, seed=_NOISE, size=size))
+    return normalise(drawn).float()
 
 
 def _fast(device: torch.device) -> bool:
