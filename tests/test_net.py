@@ -137,6 +137,38 @@ def test_stencils_add_no_parameters():
     assert sum(p.numel() for p in GSONet(stencils=True).parameters()) == 2820832
 
 
+SMALL = {"widths": (8, 8, 8), "depths": (1, 1, 1)}
+
+
+def test_a_confidence_is_added_to_a_trained_net(tmp_path):
+    known = shaken(CoarseNet(**SMALL, passes=1))
+    net = CoarseNet(**SMALL, passes=1, confidence=True)
+    net.copy_weights_from(known)
+    points = saddle(40)
+    before, after = (predict(points, model=one) - points for one in (known, net))
+    trust = 1 / (1 + np.exp(-3))  # the same everywhere, before it is trained
+    np.testing.assert_allclose(after, trust * before, atol=1e-6)
+    save(net, tmp_path / "net.safetensors")
+    kept = predict(points, model=tmp_path / "net.safetensors") - points
+    np.testing.assert_allclose(kept, after, atol=1e-4)  # in half precision
+    with pytest.raises(RuntimeError, match="confidence_head"):
+        known.copy_weights_from(net)
+
+
+@pytest.mark.parametrize("shape", [(64, 64), (40, 90)])
+def test_vertices_without_confidence_stay(shape):
+    net = shaken(CoarseNet(**SMALL, passes=2, confidence=True))
+    points = saddle(91)[: shape[0], : shape[1]]
+    moved = np.abs(predict(points, model=net) - points).max()
+    grid = torch.as_tensor(saddle(64)[None], dtype=torch.float32)
+    trust = net.confidence(grid)
+    assert trust.shape == (1, 64, 64) and bool(((trust > 0) & (trust < 1)).all())
+    with torch.no_grad():
+        net.confidence_head.bias.fill_(-40.0)
+    assert net.confidence(grid).max() < 1e-9
+    assert moved > 1e-3 and np.abs(predict(points, model=net) - points).max() < 1e-9
+
+
 def test_stencils_take_the_weights_of_a_net_without():
     one = shaken(GSONet(channels=4, blocks=1), size=0.01)
     two, three = GSONet(channels=4, blocks=1, stencils=True), GSONet(channels=4, blocks=1)
@@ -643,10 +675,9 @@ def test_developable_surfaces_and_noise_come_back(name):
     round_one = np.stack([np.sin(u), v, np.cos(u)], axis=-1)
     assert (gso.net.predict(round_one, model=name) == round_one).all()
     noisy = round_one + 0.003 * np.random.default_rng(0).standard_normal(round_one.shape)
-    before, after = (
-        gso.metrics.loss_gc_worst(x) for x in (noisy, gso.net.predict(noisy, model=name))
-    )
-    assert after <= before
+    after = gso.net.predict(noisy, model=name)
+    for more in ({}, {"scale": 1.0}):
+        assert gso.metrics.loss_gc_worst(after, **more) <= gso.metrics.loss_gc_worst(noisy, **more)
 
 
 def test_results_that_help_are_not_changed():

@@ -40,6 +40,7 @@ CLOSE = 1e-4
 def nets():
     return {
         "coarse": shaken(CoarseNet(**SMALL, passes=2), size=0.02),
+        "trusted": shaken(CoarseNet(**SMALL, passes=2, confidence=True), size=0.02),
         "flat": shaken(CoarseNet("flatten", **SMALL, passes=1), size=0.02),
         "noise": shaken(
             GSONet("denoise", channels=4, blocks=1, sigma=True, aligned=True, stencils=True),
@@ -59,7 +60,7 @@ def files(tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize("name", ["coarse", "flat", "noise"])
+@pytest.mark.parametrize("name", ["coarse", "trusted", "flat", "noise"])
 @pytest.mark.parametrize("shape", [(64, 64), (40, 90), (3, 64, 64)])
 def test_predictions_are_those_of_pytorch(files, name, shape):
     net, path = files[name]

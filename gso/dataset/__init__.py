@@ -9,7 +9,7 @@ from gso.first_use import at_first_use
 if TYPE_CHECKING:
     from gso.dataset.bezier import BezierSurface, generate
     from gso.dataset.builder import build
-    from gso.dataset.drawing import draw_many
+    from gso.dataset.drawing import draw_broad, draw_many
     from gso.dataset.labels import LABELS
     from gso.dataset.noise import LEVELS
     from gso.dataset.npy_folder import export
@@ -30,6 +30,7 @@ __all__ = [
     "Recipe",
     "Split",
     "build",
+    "draw_broad",
     "draw_many",
     "export",
     "generate",
@@ -44,7 +45,7 @@ __getattr__, __dir__ = at_first_use(
     {
         "bezier": "BezierSurface generate",
         "builder": "build",
-        "drawing": "draw_many",
+        "drawing": "draw_broad draw_many",
         "labels": "LABELS",
         "noise": "LEVELS",
         "npy_folder": "export",

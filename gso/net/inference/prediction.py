@@ -182,12 +182,12 @@ def predict(
     return out[0] if points.ndim == 3 else out
 
 
-def _harmless(surface: Array, result: Array, harm: Callable[[Array], float]) -> Array:
+def _harmless(surface: Array, result: Array, harm: Callable[[Array], tuple[float, ...]]) -> Array:
     """Return a result, moved less far where it would do harm."""
     allowed = harm(surface)
     for factor in _FACTORS:
         moved = surface + factor * (result - surface)
-        if harm(moved) <= allowed:
+        if all(new <= old for new, old in zip(harm(moved), allowed, strict=True)):
             return result if factor == 1.0 else moved
     return np.array(surface, dtype=np.float64)
 

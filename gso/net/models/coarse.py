@@ -128,6 +128,17 @@ class CoarseNet(Net):
             seen, fields = self._seen(surface, frame, passes - 1)
         return _added(fields, self._fields(seen))
 
+    @torch.no_grad()
+    def confidence(self, surface: Tensor, *, passes: int | None = None) -> Tensor:
+        """Return how far the net trusts its displacements (B, H, W): 0 to 1, at each vertex.
+
+        It is 1 for nets without a confidence.
+        """
+        fields = self.coefficients(surface, Frame.of(planes(surface)), passes)
+        if not self.confident:
+            return surface.new_ones(surface.shape[:3])
+        return torch.sigmoid(spline_field(fields[2], *surface.shape[1:3]))[:, 0]
+
     def _seen(self, surface: Tensor, frame: Frame, passes: int) -> tuple[Tensor, Fields]:
         """Return the net's input after some passes, and the sums of their coefficients."""
         p = planes(surface)

@@ -48,7 +48,7 @@ class NetTask:
     displacement : float
         Typical displacement, in radii of the unit ball.
     harm : callable, optional
-        ``harm(surface)``, for arrays (H, W, 3): a number that no result may raise above that of
+        ``harm(surface)``, for arrays (H, W, 3): numbers that no result may raise above those of
         the input.
     """
 
@@ -63,7 +63,7 @@ class NetTask:
     warm_start: bool = True
     refines: bool = False
     displacement: float = 0.01
-    harm: Callable[[Array], float] | None = None
+    harm: Callable[[Array], tuple[float, ...]] | None = None
 
     @property
     def flat(self) -> bool:

@@ -54,9 +54,12 @@ def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     return lambda result: {name: term / scale for name, term in whole.parts(result, eps).items()}
 
 
-def harm(surface: Array) -> float:
-    """Return mean |K| in the worse split of the quads, 1/size^2."""
-    return float(metrics.loss_gc_worst(surface))
+def harm(surface: Array) -> tuple[float, ...]:
+    """Return mean |K| in the worse split of the quads: in 1/length^2, and in the unit ball.
+
+    A result that grows would lower the one alone, and one that shrinks the other.
+    """
+    return metrics.loss_gc_worst(surface, scale=1.0), metrics.loss_gc_worst(surface)
 
 
 TASK = NetTask(

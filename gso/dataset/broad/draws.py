@@ -12,7 +12,7 @@ import numpy as np
 from gso import metrics
 from gso.dataset import screen
 from gso.dataset.bezier import normalise
-from gso.dataset.families import FAMILIES, Surface
+from gso.dataset.broad.families import FAMILIES, Surface
 from gso.dataset.seeds import RNG, Stream, generator
 from gso.errors import DatasetError
 from gso.hierarchy import resample
@@ -33,13 +33,22 @@ _SHEAR, _UNEVEN = 0.4, 0.5
 _TRIES = 200
 
 
+def families(split: str) -> list[str]:
+    """Return the families of a split.
+
+    >>> families("test")
+    ['constant_mean_curvature', 'grid_shell']
+    """
+    return [name for name, one in FAMILIES.items() if one.split == split]
+
+
 def family(split: str, number: int) -> str:
     """Return the family of a surface of a split; they alternate.
 
     >>> family("train", 0), family("test", 1)
     ('b_spline', 'grid_shell')
     """
-    names = [name for name, one in FAMILIES.items() if one.split == split]
+    names = families(split)
     return names[number % len(names)]
 
 
