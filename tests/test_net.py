@@ -685,3 +685,45 @@ def test_results_that_help_are_not_changed():
     kept = gso.net.predict(panel)
     assert (kept == predict(panel)).all()
     assert gso.metrics.loss_gc_worst(kept) < gso.metrics.loss_gc_worst(panel)
+
+
+def outlined(corners):
+    """A saddle inside a closed polygon with corners at multiples of 0.1, as triangles."""
+    x, y = np.meshgrid(np.arange(-20, 21), np.arange(-20, 21), indexing="ij")
+    flat = np.stack([x, y], axis=-1) * 0.05
+    flat[1:-1, 1:-1] += 0.01 * np.random.default_rng(1).uniform(-1, 1, (39, 39, 2))
+    whole = gso.Mesh.from_grid(np.dstack([flat, 0.3 * (flat[..., :1] ** 2 - flat[..., 1:] ** 2)]))
+    middle = whole.vertices[whole.triangles].mean(axis=1)[:, :2]
+    inside = np.zeros(len(middle), bool)
+    for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        between = (ay > middle[:, 1]) != (by > middle[:, 1])
+        share = (middle[:, 1] - ay) / (by - ay or 1.0)
+        inside ^= between & (middle[:, 0] < ax + share * (bx - ax))
+    used, faces = np.unique(whole.triangles[inside], return_inverse=True)
+    return gso.Mesh(whole.vertices[used], faces.reshape(-1, 3))
+
+
+OUTLINES = {
+    "U": [(-1, -1), (1, -1), (1, 1), (0.5, 1), (0.5, -0.3), (-0.5, -0.3), (-0.5, 1), (-1, 1)],
+    "T": [(-0.2, -1), (0.2, -1), (0.2, 0.5), (1, 0.5), (1, 1), (-1, 1), (-1, 0.5), (-0.2, 0.5)],
+    "round": [(np.cos(t), 0.5 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 60)[:-1]],
+}
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_meshes_with_other_outlines_are_predicted_by_their_flat_image(name):
+    mesh = outlined(OUTLINES[name])
+    result = gso.net.predict(mesh)
+    before, after = (gso.metrics.loss_gc(m, scale=1.0) for m in (mesh, result))
+    assert after < 0.5 * before
+    far = np.linalg.norm(result.vertices - mesh.vertices, axis=1)
+    assert far.max() < 0.05 * mesh.diagonal
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_mesh_gets_more_curvature(seed):
+    # Random weights do harm.
+    mesh = outlined(OUTLINES["U"])
+    result = gso.net.predict(mesh, model=shaken(CoarseNet(**SMALL), seed, size=0.05))
+    before, after = (gso.metrics.loss_gc_worst(m, scale=1.0) for m in (mesh, result))
+    assert after <= before

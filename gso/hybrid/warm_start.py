@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,6 @@ from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.net import tasks
 from gso.net.catalogue import NetLike, available, chain, missing_packages
-from gso.net.inference.mesh_grid import at_vertices, grid_of
-from gso.parametrization import Patch
 from gso.typing import Array
 
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
@@ -81,31 +79,35 @@ def predictions(
         return [Prediction(refused=why)] * len(designs)
     name = _name(task, net)
     found: list[Prediction] = [Prediction()] * len(designs)
-    sizes: dict[tuple[int, ...], list[tuple[int, Array, Patch | None]]] = {}
-    spent = np.zeros(len(designs))
+    sizes: dict[tuple[int, ...], list[tuple[int, Array]]] = {}
     for k, design in enumerate(designs):
         clock = time.perf_counter()
         try:
-            if not alone and design.grid is None:
+            _check_size(design, task)
+            if design.grid is not None:
+                if not alone:
+                    _check_curvature(design.grid)
+                sizes.setdefault(design.grid.shape, []).append((k, design.grid))
+            elif not alone:
                 raise MeshError("on meshes that are not grids, nets were not found to help")
-            grid, patch = _seen(design, task)
-            if not alone:
-                _check_curvature(grid)
-            sizes.setdefault(grid.shape, []).append((k, grid, patch))
+            else:
+                found[k] = Prediction(_of_mesh(design, task, net, passes), net=name)
         except MeshError as error:
-            found[k] = Prediction(None, time.perf_counter() - clock, name, str(error))
-        spent[k] = time.perf_counter() - clock
+            found[k] = Prediction(net=name, refused=str(error))
+        found[k] = replace(found[k], seconds=time.perf_counter() - clock)
     for group in sizes.values():
         clock = time.perf_counter()
-        moved = _predicted(np.stack([grid for _, grid, _ in group]), task, net, passes, alone)
+        moved = _predicted(np.stack([grid for _, grid in group]), task, net, passes, alone)
         share = (time.perf_counter() - clock) / len(group)
-        for (k, grid, patch), values in zip(group, moved, strict=True):
+        for (k, _), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
-            refused = values if isinstance(values, str) else ""
-            points = (
-                None if isinstance(values, str) else at_vertices(designs[k], grid, patch, values)
-            )
-            seconds = spent[k] + share + time.perf_counter() - clock
+            points, refused = None, ""
+            if isinstance(values, str):
+                refused = values
+            else:
+                points = np.empty((len(designs[k].vertices), values.shape[-1]))
+                points[designs[k].grid_index] = values
+            seconds = found[k].seconds + share + time.perf_counter() - clock
             found[k] = Prediction(points, seconds, name, refused)
     return found
 
@@ -127,22 +129,16 @@ def _name(task: str, net: NetLike | None) -> str:
     return type(net).__name__ if hasattr(net, "task") else str(net)
 
 
-def _seen(design: Mesh, task: str) -> tuple[Array, Patch | None]:
-    """Return the net's input for a design: its grid, or that of a resampled patch.
-
-    Raises
-    ------
-    MeshError
-        The design is too small for a net, or cannot be resampled.
-    """
-    kind, count = tasks.get(task), int(design.used.sum())
+def _check_size(design: Mesh, task: str) -> None:
+    """Refuse designs that are too small for a net."""
     if design.grid is not None:
         height, width = design.grid.shape[:2]
         if min(height, width) < _SMALLEST:
             raise MeshError(f"a grid {height} x {width} is solved faster than a net sees it")
-    elif count < _SMALLEST**2 and not kind.noisy:
+        return
+    count = int(design.used.sum())
+    if count < _SMALLEST**2 and not tasks.get(task).noisy:
         raise MeshError(f"a mesh of {count} vertices is solved faster than a net sees it")
-    return grid_of(design, kind)
 
 
 def _check_curvature(grid: Array) -> None:
@@ -153,6 +149,14 @@ def _check_curvature(grid: Array) -> None:
             f"mean |K| in the unit ball is {curved:.3g}, and above {CURVED:.2g} is too far from "
             "what nets are taught"
         )
+
+
+def _of_mesh(design: Mesh, task: str, net: NetLike | None, passes: int | None) -> Array:
+    """Return a net's result at the vertices of a mesh that is no grid."""
+    from gso.net import predict
+
+    moved = predict(design, task=task, model=net, passes=passes).vertices
+    return moved[:, : tasks.get(task).components]
 
 
 def _predicted(

@@ -56,7 +56,7 @@ from gso.metrics.principal_strain import (
     stretches,
 )
 from gso.metrics.roughness import edge_ratios, fairness, fairness_ratio, loop_ratios, nonplanarity
-from gso.metrics.surfaces import components, unit
+from gso.metrics.surfaces import SurfaceLike, components, unit
 
 __all__ = [
     "INFO",

@@ -11,6 +11,8 @@ from gso.errors import MeshError
 from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.parametrization.embedding import parts, spanned
+from gso.parametrization.low_strain import low_strain
+from gso.parametrization.packing import upright
 from gso.spline import basis, basis_matrix, clamped_knots
 from gso.typing import Array, Ints
 
@@ -55,12 +57,15 @@ class Patch:
         return np.stack(columns, axis=1)
 
 
-def as_patch(mesh: Mesh, size: int) -> Patch:
+def as_patch(mesh: Mesh, size: int, *, flat: bool = False) -> Patch:
     """Resample a mesh of one component to a grid.
 
     A harmonic map takes the mesh to a rectangle, whose corners are the sharpest corners of
     the outer boundary. A spline fitted to the vertices over the rectangle is sampled on the
     grid; it also covers holes.
+
+    An outline that is far from four-sided makes that map uneven. The flat image of the mesh, in
+    the rectangle around it, is then the better one: the spline is continued beyond the outline.
 
     Parameters
     ----------
@@ -68,6 +73,8 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
         One component with a boundary and without handles; it may have holes.
     size : int
         Vertices along both sides of the grid.
+    flat : bool
+        Whether parameters are those of the flat image.
 
     Raises
     ------
@@ -87,7 +94,13 @@ def as_patch(mesh: Mesh, size: int) -> Patch:
         raise MeshError("it is not one piece with a boundary and without handles")
     piece = _unit(mesh, pieces[0])
     loop, at, sides = _boundary(piece)
-    image = spanned(_filled(piece, loop), loop, at)[: len(piece.vertices)]
+    whole, count = _filled(piece, loop), len(piece.vertices)
+    if flat:
+        image = upright(low_strain(whole).flat)[:count]
+        image -= image.min(axis=0)
+        sides = image.max(axis=0)
+    else:
+        image = spanned(whole, loop, at)[:count]
     parameters = (image / sides).clip(0.0, 1.0)
     fitted, grid = _spline(piece.vertices, parameters, size)
     far = float(np.linalg.norm(fitted - piece.vertices, axis=1).max())

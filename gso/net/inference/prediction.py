@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, cast, overload
@@ -18,7 +18,8 @@ from gso.net import tasks
 from gso.net.catalogue import SIZE, NetLike, chain, exported, missing_packages
 from gso.net.inference import denoising
 from gso.net.inference.applied_net import AppliedNet
-from gso.net.inference.mesh_grid import at_vertices, grid_of
+from gso.net.inference.harm import harmless
+from gso.net.inference.mesh_grid import predicted
 from gso.quantities import as_positive
 from gso.typing import AnyPath, Array, MeshLike, Polyhedron
 
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 #: Smallest side of a grid that is resampled to the size of the nets.
 SMALLEST = 4
-#: Factors on displacements that are tried, where the whole ones would do harm.
-_FACTORS = (1.0, 0.5, 0.25)
 #: Number of surfaces per batch.
 _BATCH = 64
 
@@ -79,7 +78,8 @@ def predict(
 
     A mesh that is no grid, in one piece with a boundary and without handles, is resampled to
     64 x 64 vertices (:func:`gso.parametrization.as_patch`), and the displacements are
-    interpolated at its vertices; not for "denoise".
+    interpolated at its vertices; not for "denoise". For "developable" that is done by a harmonic
+    map and by the flat image, and the result with less curvature is taken.
 
     Parameters
     ----------
@@ -141,23 +141,25 @@ def predict(
     kind = tasks.get(task)
     if _is_mesh(surface):
         mesh = io.as_mesh(surface)
+
+        def ask(grid: Array) -> Array:
+            return predict(
+                grid,
+                task=task,
+                model=model,
+                repeat=repeat,
+                passes=passes,
+                sigma=sigma,
+                device=device,
+                guarded=False,
+            )
+
         try:
-            grid, patch = grid_of(mesh, kind)
+            found = predicted(mesh, kind, ask, guarded)
         except MeshError as error:
             raise MeshError(
                 f"the mesh cannot be resampled to a grid for a net: {error}; use gso.tno.optimize"
             ) from None
-        done = predict(
-            grid,
-            task=task,
-            model=model,
-            repeat=repeat,
-            passes=passes,
-            sigma=sigma,
-            device=device,
-            guarded=guarded,
-        )
-        found = at_vertices(mesh, grid, patch, done)
         return mesh.replaced(np.pad(found, [(0, 0), (0, 3 - found.shape[1])]))
     points = _checked(cast(ArrayLike, surface))
     batch = points[None] if points.ndim == 3 else points
@@ -178,18 +180,8 @@ def predict(
     ]
     out = np.concatenate(blocks) if blocks else np.empty((*batch.shape[:3], kind.components))
     if guarded and kind.harm is not None:
-        out = np.stack([_harmless(*pair, kind.harm) for pair in zip(batch, out, strict=True)])
+        out = np.stack([harmless(*pair, kind.harm) for pair in zip(batch, out, strict=True)])
     return out[0] if points.ndim == 3 else out
-
-
-def _harmless(surface: Array, result: Array, harm: Callable[[Array], tuple[float, ...]]) -> Array:
-    """Return a result, moved less far where it would do harm."""
-    allowed = harm(surface)
-    for factor in _FACTORS:
-        moved = surface + factor * (result - surface)
-        if all(new <= old for new, old in zip(harm(moved), allowed, strict=True)):
-            return result if factor == 1.0 else moved
-    return np.array(surface, dtype=np.float64)
 
 
 def _is_mesh(surface: object) -> bool:

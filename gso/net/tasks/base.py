@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from gso.metrics import SurfaceLike
 from gso.typing import Array
 
 if TYPE_CHECKING:
@@ -48,8 +49,8 @@ class NetTask:
     displacement : float
         Typical displacement, in radii of the unit ball.
     harm : callable, optional
-        ``harm(surface)``, for arrays (H, W, 3): numbers that no result may raise above those of
-        the input.
+        ``harm(surface)``, for arrays (H, W, 3) and meshes: numbers that no result may raise above
+        those of the input.
     """
 
     name: str
@@ -63,7 +64,7 @@ class NetTask:
     warm_start: bool = True
     refines: bool = False
     displacement: float = 0.01
-    harm: Callable[[Array], tuple[float, ...]] | None = None
+    harm: Callable[[SurfaceLike], tuple[float, ...]] | None = None
 
     @property
     def flat(self) -> bool:

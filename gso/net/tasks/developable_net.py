@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from gso import metrics
+from gso.metrics import SurfaceLike
 from gso.net.tasks.base import NetTask
 from gso.tasks import developable
 from gso.tasks.developable.objective import TYPICAL_CURVATURE
@@ -54,7 +55,7 @@ def energy(batch: Batch, phase: Phase, progress: float) -> Cost:
     return lambda result: {name: term / scale for name, term in whole.parts(result, eps).items()}
 
 
-def harm(surface: Array) -> tuple[float, ...]:
+def harm(surface: SurfaceLike) -> tuple[float, ...]:
     """Return mean |K| in the worse split of the quads: in 1/length^2, and in the unit ball.
 
     A result that grows would lower the one alone, and one that shrinks the other.
