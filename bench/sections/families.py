@@ -104,7 +104,11 @@ def outlines(model: str = "developable", seed: int = 0) -> dict[str, Any]:
             row: dict[str, float] = {"vertices": len(mesh.vertices)}
             for flat in (False, True):
                 how = "flat image" if flat else "harmonic"
-                patch = as_patch(mesh, SIZE, flat=flat)
+                row[how] = np.nan
+                try:
+                    patch = as_patch(mesh, SIZE, flat=flat)
+                except gso.MeshError:
+                    continue
                 moved = net.predict(patch.grid, model=model, guarded=False) - patch.grid
                 points = mesh.vertices.copy()
                 points[patch.vertices] += patch.at_vertices(moved)
