@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
+from gso.short_repr import short_repr
 from gso.typing import Array, Flags, Ints
 
 #: Angle in radians up to which edges are in line, and bends equal.
@@ -188,6 +189,8 @@ class Pattern:
     faces: Ints
     vertex: Ints
     seams: Ints = field(default_factory=_no_seams)
+
+    __repr__ = short_repr
 
     @classmethod
     def whole(cls, surface: Mesh, flat: Array) -> Pattern:

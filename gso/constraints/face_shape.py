@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject, numbers
 from gso.constraints.equations import Lengths, Part, Planar
+from gso.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,8 @@ class PlanarFaces(Constraint):
 
     faces: ArrayLike | None = None
     weight: float | None = None
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         if subject.flat:
@@ -57,6 +60,8 @@ class FixedLengths(Constraint):
     edges: ArrayLike | None = None
     lengths: ArrayLike | None = None
     weight: float | None = None
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         mesh = subject.mesh

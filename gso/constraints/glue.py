@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import Part, Relations
 from gso.mesh.topology import label_components
+from gso.short_repr import short_repr
 from gso.typing import Ints
 
 
@@ -31,6 +32,8 @@ class Glue(Constraint):
     """
 
     pairs: ArrayLike
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         pairs = subject.pairs(self.pairs, "what to glue")

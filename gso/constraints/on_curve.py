@@ -11,6 +11,7 @@ from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import OnLines, Part, Pins
 from gso.mesh import Polylines
 from gso.mesh.polyline import CORNER, turns
+from gso.short_repr import short_repr
 from gso.typing import Array, Ints
 
 
@@ -49,6 +50,8 @@ class OnCurve(Constraint):
     points: ArrayLike
     closed: bool = False
     weight: float | None = None
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         if not isinstance(self.closed, bool | np.bool_):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import Part, Pins
+from gso.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,8 @@ class Fixed(Constraint):
     """
 
     ids: ArrayLike
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         subject.in_space("give a Handle with positions (k, 2)")
@@ -67,6 +70,8 @@ class Handle(Constraint):
     ids: ArrayLike
     positions: ArrayLike
     weight: float | None = None
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         ids = subject.ids(self.ids)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import Part, Straight
 from gso.mesh import Polylines
+from gso.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class Ruling(Constraint):
     """
 
     ids: ArrayLike
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         subject.in_space("take gso.OnCurve with a line in the plane")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from gso.constraints.base import Constraint, Subject
 from gso.constraints.equations import Part
 from gso.energy import Weighted, smooth_curve
+from gso.short_repr import short_repr
 from gso.typing import Array, Ints
 
 
@@ -40,6 +41,8 @@ class SmoothCurves(Constraint):
 
     curves: Sequence[ArrayLike]
     weight: float = 1e-5
+
+    __repr__ = short_repr
 
     def parts(self, subject: Subject) -> list[Part]:
         found = []

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from gso.errors import MeshError
 from gso.mesh.mesh import Mesh
 from gso.mesh.topology import edge_graph, edge_keys, label_components, pair_keys
+from gso.short_repr import short_repr
 from gso.typing import Ints
 
 #: Relative difference below which two path lengths count as equal.
@@ -40,6 +41,8 @@ class Cut:
     mesh: Mesh
     vertex: Ints
     seams: Ints
+
+    __repr__ = short_repr
 
 
 def cut(mesh: Mesh, edges: ArrayLike) -> Cut:

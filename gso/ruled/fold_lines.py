@@ -12,6 +12,7 @@ from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys
 from gso.ruled.strip_layout import Strips
 from gso.ruled.unroll import Unrolled
+from gso.short_repr import short_repr
 from gso.typing import Array, Ints
 
 
@@ -34,6 +35,8 @@ class Folds:
     edges: Ints
     angles: Array
     radii: Array
+
+    __repr__ = short_repr
 
     @property
     def smallest_radius(self) -> float:

@@ -21,6 +21,7 @@ from gso.ruled.strip_fit import Fit, Job
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed
+from gso.short_repr import short_repr
 from gso.typing import Array, Flags, Ints
 
 _Map: TypeAlias = Callable[[Array], Array]
@@ -74,6 +75,8 @@ class RuledSurface:
     untrimmed: Untrimmed | None = None
     deviation: metrics.Distances | None = None
     strain: float | None = None
+
+    __repr__ = short_repr
 
     @property
     def strips(self) -> int:

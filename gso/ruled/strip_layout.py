@@ -12,6 +12,7 @@ import numpy as np
 
 from gso.geometry.vectors import cross
 from gso.mesh.topology import label_components
+from gso.short_repr import short_repr
 from gso.typing import Array, Flags, Ints
 
 
@@ -38,6 +39,8 @@ class Strips:
 
     index: tuple[Ints, ...]
     flats: Ints = field(default_factory=_no_faces)
+
+    __repr__ = short_repr
 
     @classmethod
     def sequence(cls, rulings: int, strips: int = 1) -> Strips:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gso.ruled.strip_layout import Strips
+from gso.short_repr import short_repr
 from gso.typing import Array, Ints
 
 
@@ -28,6 +29,8 @@ class Untrimmed:
     strips: Strips
     vertices: Array
     owner: Ints
+
+    __repr__ = short_repr
 
     def transformed(self, move: Callable[[Array], Array]) -> Untrimmed:
         """Return the strips with moved vertices."""

@@ -12,6 +12,7 @@ from gso.geometry.polygon import rectangle
 from gso.mesh import Mesh, Paths
 from gso.pattern import Folded
 from gso.pipeline import lay_out
+from gso.short_repr import short_repr
 from gso.typing import Array, Ints
 
 #: Smallest share of a piece's area on both sides of a neck.
@@ -41,6 +42,8 @@ class Sheet:
     flat: Array
     folded: Folded = field(default_factory=Folded)
     exact_strain: float | None = None
+
+    __repr__ = short_repr
 
     @cached_property
     def strains(self) -> dict[str, float]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from gso import geometry
 from gso.errors import MeshError, OptionError
+from gso.short_repr import short_repr
 from gso.typing import Array
 
 if TYPE_CHECKING:
@@ -106,6 +107,8 @@ class BSplineSurface:
     knots_u: Array
     knots_v: Array
     gap: Gap | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in ("net", "knots_u", "knots_v"):

@@ -27,6 +27,7 @@ from gso.quantities import (
     millimetres,
 )
 from gso.seams.edge_prices import Avoid, Follow
+from gso.short_repr import short_repr
 from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
 from gso.wording import places
@@ -75,6 +76,8 @@ class Fabrication:
     sheets: tuple[Drawing, ...]
     certificate: Json
     files: tuple[str, ...] = field(default=())
+
+    __repr__ = short_repr
 
     @property
     def usable(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gso.errors import NonManifoldError
 from gso.mesh.topology.graph import edge_graph, label_components
+from gso.short_repr import short_repr
 from gso.typing import Flags, Ints
 
 
@@ -31,6 +32,8 @@ class HalfEdges:
     prev: Ints
     twin: Ints
     vertex_count: int
+
+    __repr__ = short_repr
 
     @cached_property
     def boundary_vertex(self) -> Flags:
