@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -13,10 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.shell_completion import get_completion_class
 from click.testing import CliRunner
 
 import gso
-from gso.cli import main
+from gso.cli import TABLE, main
 
 PANEL = Path(__file__).resolve().parents[1] / "examples" / "panel.obj"
 
@@ -515,6 +517,40 @@ def test_version_and_help(run, monkeypatch):
     for command in ("optimize", "metrics", "info", "plot"):
         assert command in run("--help").stdout
         assert run(command, "--help").exit_code == 0
+
+
+def test_without_a_command_it_says_what_to_type(run):
+    done = run()
+    assert done.exit_code == 0
+    for words in (row[1].split() for row in TABLE):
+        assert words[:2] == ["gso", words[1]] and words[1] in main.commands
+        assert " ".join(words) in done.stdout
+
+
+def every_command(group, name):
+    for word, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from every_command(command, f"{name} {word}")
+        else:
+            yield f"{name} {word}", command
+
+
+@pytest.mark.parametrize(("name", "command"), list(every_command(main, "gso")))
+def test_help_begins_with_an_example_that_is_right(run, name, command):
+    shown = run(*name.split()[1:], "--help").stdout
+    assert shown.startswith(f"Example:\n  {name} ")
+    lines = [command.example.splitlines()[0], *(row[1] for row in TABLE)]
+    for line in (line for line in lines if line.startswith(f"{name} ")):
+        words = shlex.split(line.partition(" >>")[0])[len(name.split()) :]
+        command.make_context(name, words)  # all options are known, and their values good
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion(run, shell, monkeypatch):
+    assert "_GSO_COMPLETE" in run("completion", shell).stdout
+    kind = get_completion_class(shell)(main, {}, "gso", "_GSO_COMPLETE")
+    found = [one.value for one in kind.get_completions(["optimize"], "--max-d")]
+    assert found == ["--max-deviation"]
 
 
 def test_choices_are_those_of_the_library():

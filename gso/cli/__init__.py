@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from gso.cli.commands import TABLE, overview
+from gso.cli.completion import completion
 from gso.cli.dataset import dataset
 from gso.cli.fabricate_command import fabricate
 from gso.cli.inspect import info, metrics, plot
@@ -14,7 +16,7 @@ from gso.cli.train import train
 from gso.cli.unfold_command import unfold
 from gso.errors import GSOError
 
-__all__ = ["main"]
+__all__ = ["TABLE", "main"]
 
 #: Exit code by which shells report a program interrupted by Ctrl-C.
 INTERRUPTED = 130
@@ -48,6 +50,7 @@ def _version(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
 
 @click.group(
     cls=_Commands,
+    invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
 @click.option(
@@ -58,14 +61,18 @@ def _version(ctx: click.Context, option: click.Parameter, asked: bool) -> None:
     callback=_version,
     help="Print the version.",
 )
-def main() -> None:
+@click.pass_context
+def main(ctx: click.Context) -> None:
     """Make surfaces that can be built from flat sheets.
 
     Make them developable, lay them flat or denoise them (optimize), cut whole designs into pieces
     (pieces), make exactly developable strips (strips), make nets of flat faces (unfold), write what
-    a cutter needs (fabricate).
+    a cutter needs (fabricate). Without a command gso prints what to type for what you have.
     """
+    if ctx.invoked_subcommand is None:
+        click.echo(f"{overview()}\n\ngso COMMAND --help says more; gso --help lists all commands.")
 
 
-for _command in (optimize, strips, pieces, unfold, metrics, info, plot, dataset, fabricate, train):
+_COMMANDS = (optimize, strips, pieces, unfold, metrics, info, plot, dataset, fabricate, train)
+for _command in (*_COMMANDS, completion):
     main.add_command(_command)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.errors import DatasetError, OptionError
 
 if TYPE_CHECKING:
@@ -24,7 +25,12 @@ def dataset() -> None:
     """Build, inspect and export datasets of surfaces for training and comparison."""
 
 
-@dataset.command(short_help="Build a set of surfaces with labels.")
+@dataset.command(
+    cls=Command,
+    short_help="Build a set of surfaces with labels.",
+    example="gso dataset build -o surfaces --n 100 --label none\n"
+    "draws a hundred surfaces, without labels",
+)
 @click.option(
     "-o", "--output", "out", metavar="DIR", required=True, type=click.Path(), help="Folder."
 )
@@ -131,7 +137,12 @@ def _memory() -> str:
     return f"; at most {here:.0f} MiB in this process{each}"
 
 
-@dataset.command(short_help="Say what a set holds.")
+@dataset.command(
+    cls=Command,
+    short_help="Say what a set holds.",
+    example="gso dataset info surfaces\n"
+    "prints how many surfaces are in each split, and how curved they are",
+)
 @click.argument("folder", metavar="DIR", type=click.Path())
 @click.option("--split", help="Split whose labels are shown; test when there is one.")
 @click.option("--verify", is_flag=True, help="Compare the checksums of all files.")
@@ -183,7 +194,11 @@ def _plot(data: Dataset, path: str) -> None:
     plot_histograms(values, limits, path=path)
 
 
-@dataset.command(short_help="Write a set as .npy files.")
+@dataset.command(
+    cls=Command,
+    short_help="Write a set as .npy files.",
+    example="gso dataset export surfaces -o arrays\nwrites one .npy file for each surface",
+)
 @click.argument("folder", metavar="DIR", type=click.Path())
 @click.option(
     "-o", "--output", "out", metavar="FOLDER", required=True, type=click.Path(), help="Folder."

@@ -10,6 +10,7 @@ from click.core import ParameterSource
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -17,7 +18,12 @@ if TYPE_CHECKING:
     from gso.workshop.fabricate import Fabrication
 
 
-@click.command(short_help="Make designs of flat parts, for the cutter.")
+@click.command(
+    cls=Command,
+    short_help="Make designs of flat parts, for the cutter.",
+    example="gso fabricate design.obj -o job --max-deviation 5mm --thickness 2 --sheet 2500 1250\n"
+    "writes drawings of all parts and of the sheets that they are cut from, and a page",
+)
 @click.argument("inputs", metavar="IN...", nargs=-1, required=True, type=click.Path())
 @shared.output(
     "Folder to write to: parts, sheets, surfaces, certificate.json, index.html. Started "

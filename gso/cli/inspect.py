@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gso.cli import file_options
+from gso.cli.commands import Command
 from gso.errors import GSOError, OptionError
 
 if TYPE_CHECKING:
@@ -14,7 +15,12 @@ if TYPE_CHECKING:
     from gso.typing import Array
 
 
-@click.command(short_help="Compare two surfaces.")
+@click.command(
+    cls=Command,
+    short_help="Compare two surfaces.",
+    example="gso metrics panel.obj panel_developable.obj\n"
+    "prints curvature, distances and strains of the second, relative to the first",
+)
 @click.argument("before", type=click.Path())
 @click.argument("after", type=click.Path())
 @file_options.weld
@@ -68,7 +74,11 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
     return plain(values), notes
 
 
-@click.command(short_help="Say what a mesh file holds.")
+@click.command(
+    cls=Command,
+    short_help="Say what a mesh file holds.",
+    example="gso info panel.obj\nprints its size, holes and curvature",
+)
 @click.argument("names", metavar="FILE...", nargs=-1, required=True, type=click.Path())
 @file_options.weld
 def info(names: tuple[str, ...], weld: float | None) -> None:
@@ -159,7 +169,12 @@ def _point(point: Array) -> str:
     return f"({', '.join(f'{c:.6g}' for c in point)})"
 
 
-@click.command(short_help="Draw a surface or a result.")
+@click.command(
+    cls=Command,
+    short_help="Draw a surface or a result.",
+    example="gso plot panel_developable.obj --before panel.obj -o both.png\n"
+    "draws both, coloured by their curvature",
+)
 @click.argument("file", type=click.Path())
 @click.option(
     "-o", "--output", "out", metavar="PNG", required=True, type=click.Path(), help="Picture."

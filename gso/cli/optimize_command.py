@@ -11,12 +11,18 @@ import click
 from gso import tasks
 from gso.cli import file_options
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.cli.optimize_job import Job, is_cad
 from gso.cli.single_file import single
 from gso.errors import OptionError
 
 
-@click.command(short_help="Make surfaces developable, flatten or denoise them.")
+@click.command(
+    cls=Command,
+    short_help="Make surfaces developable, flatten or denoise them.",
+    example="gso optimize panel.obj -o panel_developable.obj --plot panel.png\n"
+    "makes a panel developable, and draws both",
+)
 @click.argument("names", metavar="IN...", nargs=-1, required=True, type=click.Path())
 @shared.output(
     "File to write; a folder when there are several inputs. The suffix says the format: "

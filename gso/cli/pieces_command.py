@@ -9,13 +9,19 @@ import click
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
     from gso.seams import Segmentation
 
 
-@click.command(short_help="Cut a design into pieces that can be laid flat.")
+@click.command(
+    cls=Command,
+    short_help="Cut a design into pieces that can be laid flat.",
+    example="gso pieces bunny.obj -o pieces --max-deviation 2mm\n"
+    "finds few pieces within 2 mm that can be laid flat",
+)
 @click.argument("name", metavar="IN", type=click.Path())
 @shared.output(
     "Folder to write to: the pieces as groups of an OBJ file, their patterns at 1:1 (SVG), a "

@@ -9,6 +9,7 @@ import click
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.cli.optimize_job import Job
 from gso.cli.single_file import single
 
@@ -30,7 +31,12 @@ class _StripsJob(Job):
         return lay(mesh, unit=self.unit, **self.keywords, callback=callback)
 
 
-@click.command(short_help="Make strips that are exactly developable.")
+@click.command(
+    cls=Command,
+    short_help="Make strips that are exactly developable.",
+    example="gso strips facade.obj -o strips.svg --max-deviation 10mm\n"
+    "makes strips with straight rulings within 10 mm, as patterns at 1:1",
+)
 @click.argument("name", metavar="IN", type=click.Path())
 @shared.output(
     "File to write. The suffix says the format: .npz is the full result, .svg the patterns at "

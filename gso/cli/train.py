@@ -11,6 +11,7 @@ import click
 
 from gso.cli import progress
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -23,7 +24,12 @@ _SHOWN = ("loss_gc", "K_A_r", "d_H", "strain_mean", "loss_iso_cell", "theta")
 _MAPPED, _TRIMMED, _LARGE = -3, -1, 2**25
 
 
-@click.command(short_help="Train a net.")
+@click.command(
+    cls=Command,
+    short_help="Train a net.",
+    example="gso train developable --data surfaces --out run --minutes 180\n"
+    "trains the default net for three hours",
+)
 @click.argument("config", type=click.Path())
 @click.option("--data", metavar="DIR", required=True, type=click.Path(), help="Set of surfaces.")
 @click.option("--out", metavar="RUN", required=True, type=click.Path(), help="Folder of the run.")

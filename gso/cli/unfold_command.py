@@ -9,6 +9,7 @@ import click
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
+from gso.cli.commands import Command
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -16,7 +17,12 @@ if TYPE_CHECKING:
     from gso.workshop import Drawing, Finish
 
 
-@click.command(short_help="Make the net of a surface of flat faces.")
+@click.command(
+    cls=Command,
+    short_help="Make the net of a surface of flat faces.",
+    example="gso unfold bracket.step -o bracket.dxf\n"
+    "lays flat faces out in one plane, with lines to bend along",
+)
 @click.argument("name", metavar="IN", type=click.Path())
 @shared.output(
     "Drawing to write, .svg, .dxf or .pdf: the parts at 1:1 with layers to cut and to fold. In a "
