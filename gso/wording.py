@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Callable, Sequence
 
 import numpy as np
+
+_log = logging.getLogger("gso")
 
 #: Largest number of places that a reason lists.
 _NAMED = 6
@@ -54,3 +57,18 @@ def percent(value: float, digits: int = 3) -> str:
     """
     shown = 100.0 * value
     return f"{length(shown if shown >= 1e-4 else 0.0, '', digits)} %"
+
+
+def logged(callback: Callable[[str], None] | None) -> Callable[[str], None]:
+    """Return a function that says what is being done: to a callback, and to the log "gso".
+
+    >>> logged(print)("seams along edges")
+    seams along edges
+    """
+
+    def say(text: str) -> None:
+        _log.info(text)
+        if callback is not None:
+            callback(text)
+
+    return say

@@ -553,6 +553,45 @@ def test_completion(run, shell, monkeypatch):
     assert found == ["--max-deviation"]
 
 
+def piped(*words, given):
+    """Run the command line with something on standard input."""
+    done = CliRunner().invoke(main, [str(w) for w in words], input=given, prog_name="gso")
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exc_info
+    return done
+
+
+def test_standard_input_and_output(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = PANEL.read_bytes()
+    done = piped("optimize", "-", "-o", "-", given=given)
+    assert done.exit_code == 0 and "largest strain" in done.stderr
+    Path("out.obj").write_text(done.stdout)
+    plain = piped("optimize", PANEL, "-o", "plain.obj", given=b"")
+    assert plain.exit_code == 0
+    assert Path("out.obj").read_bytes() == Path("plain.obj").read_bytes()
+    assert len(list(tmp_path.iterdir())) == 2
+    off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    assert "triangles" in piped("info", "-", given=off).stdout
+    assert refused(piped("info", "-", given=b""), "standard input is empty")
+    assert refused(piped("optimize", "-", "-o", "-", "--json", given=given), "--json")
+
+
+def test_json_instead_of_text(run, small):
+    found = json.loads(run("optimize", small, "-o", "out.obj", "--json").stdout)
+    assert found["output"] == "out.obj" and found["usable"] and found["metrics"]["d_H"] > 0
+    many = json.loads(run("optimize", small, PANEL, "-o", "many", "--json").stdout)
+    assert [one["input"] for one in many] == [str(small), str(PANEL)]
+    (facts,) = json.loads(run("info", small, "--json").stdout)
+    assert facts["file"] == str(small) and "grid" in facts["kind"]
+    strips = json.loads(run("strips", PANEL, "-o", "strips.npz", "--json").stdout)
+    assert strips["task"] == "developable"
+    pieces = json.loads(run("pieces", PANEL, "-o", "pieces", "--max-strain", "1%", "--json").stdout)
+    assert len(pieces["pieces"]) >= 1
+    house = PANEL.with_name("house.obj")
+    net = json.loads(run("unfold", house, "-o", "net.svg", "--json").stdout)
+    assert net["cut_length"] > 0 and sum(part["folds"] for part in net["parts"]) > 0
+
+
 def test_choices_are_those_of_the_library():
     def choices(command, name):
         return set(next(o for o in main.commands[command].params if o.name == name).type.choices)

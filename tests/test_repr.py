@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import gso
-from gso.short_repr import LINES, WIDTH, short_repr
 from tests.conftest import saddle
 
+#: Largest number of lines, and of characters of one.
+LINES, WIDTH = 5, 100
 T = np.linspace(0, 1, 40)
 PANEL = gso.Mesh.from_grid(saddle(24))
 
@@ -51,7 +52,16 @@ def test_representations_are_short(name):
 
 
 def test_values_are_shown_by_their_kind():
-    found = short_repr(gso.Pattern(np.zeros((9, 2)), np.zeros((4, 4), int), np.arange(9)))
+    found = repr(gso.Pattern(np.zeros((9, 2)), np.zeros((4, 4), int), np.arange(9)))
     assert found == (
         "Pattern(flat=float64 (9, 2), faces=int64 (4, 4), vertex=int64 (9,), seams=int64 (0, 2, 2))"
     )
+
+
+def test_solves_and_searches_are_logged(caplog):
+    caplog.set_level("INFO", "gso")
+    gso.tno.optimize(saddle(16, strength=0.1))
+    assert any("developable by 'curvature': " in line for line in caplog.messages)
+    caplog.clear()
+    gso.pieces(PANEL, max_deviation="5%", effort="draft", workers=0)
+    assert any("pieces" in line for line in caplog.messages)

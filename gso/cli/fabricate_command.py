@@ -159,11 +159,13 @@ if TYPE_CHECKING:
 @shared.scheduler
 @file_options.weld
 @file_options.chord
+@shared.as_json
 @shared.quiet
 def fabricate(
     inputs: tuple[str, ...],
     folder: str,
     weld: float | None,
+    as_json: bool,
     quiet: bool,
     rotations: str,
     **given: Any,
@@ -210,7 +212,10 @@ def fabricate(
     )
     with words() as say:
         done = make.fabricate(meshes, folder, finish=finish, rotations=turns, callback=say, **given)
-    shared.tell(text(done), quiet=quiet)
+    if as_json:
+        shared.tell_json(done.certificate)
+    else:
+        shared.tell(text(done), quiet=quiet)
     click.get_current_context().exit(0 if done.usable else 1)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import click
@@ -39,7 +40,7 @@ def _remembered(ctx: click.Context, option: click.Parameter, value: float | None
     ctx.meta[_CHORD] = value
 
 
-_CHORD = "gso.chord"
+_CHORD, _STDIN = "gso.chord", "gso.stdin"
 #: ``--chord MM``; :func:`load` and :func:`source` take it from the command's context.
 chord = click.option(
     "--chord",
@@ -55,18 +56,63 @@ chord = click.option(
 force = click.option("--force", is_flag=True, help="Let an output replace an input.")
 
 
+#: The name that stands for standard input or output.
+STANDARD = "-"
+#: First bytes of files, by their suffix; others are OBJ.
+_BEGIN = {b"OFF": ".off", b"ply": ".ply", b"solid": ".stl", b"\x93NUMPY": ".npy", b"PK": ".npz"}
+
+
 def load(file: str, weld: float | None = None) -> Mesh:
-    """Read a mesh from a file, and merge vertices if `weld` is given."""
+    """Read a mesh from a file or standard input, and merge vertices if `weld` is given."""
     from gso import io
 
-    return io.load(file, weld=weld, chord=_chord())
+    return io.load(_on_disk(file), weld=weld, chord=_chord())
+
+
+def _on_disk(file: str) -> str:
+    """Return a file's name, or that of a temporary file with what standard input holds."""
+    if file != STANDARD:
+        return file
+    context = click.get_current_context()
+    if _STDIN not in context.meta:
+        data = sys.stdin.buffer.read()
+        if not data:
+            raise OptionError("standard input is empty; give a mesh, such as an OBJ file")
+        suffix = next((end for begin, end in _BEGIN.items() if data.startswith(begin)), ".obj")
+        path = os.path.join(_temporary(context), f"stdin{suffix}")
+        with open(path, "wb") as stream:
+            stream.write(data)
+        context.meta[_STDIN] = path
+    return str(context.meta[_STDIN])
+
+
+def _temporary(context: click.Context) -> str:
+    """Make a folder that is removed when the command ends."""
+    from tempfile import TemporaryDirectory
+
+    return context.with_resource(TemporaryDirectory(prefix="gso-"))
+
+
+@contextmanager
+def written(out: str) -> Iterator[str]:
+    """Provide the name of the file to write, whose content then goes to standard output for "-".
+
+    It is an OBJ file there.
+    """
+    if out != STANDARD:
+        yield out
+        return
+    path = os.path.join(_temporary(click.get_current_context()), "stdout.obj")
+    yield path
+    with open(path, "rb") as stream:
+        sys.stdout.buffer.write(stream.read())
 
 
 def source(file: str, weld: float | None) -> str | Unwelded:
     """Return a file as input of :func:`gso.as_mesh`, for a worker process to read."""
     from gso.io import Unwelded
 
-    chord = _chord()
+    chord, file = _chord(), _on_disk(file)
     return file if weld is None and chord is None else Unwelded(file, weld, chord)
 
 

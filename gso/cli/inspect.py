@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gso.cli import file_options
+from gso.cli import shared_options as shared
 from gso.cli.commands import Command
 from gso.errors import GSOError, OptionError
 
@@ -24,22 +25,20 @@ if TYPE_CHECKING:
 @click.argument("before", type=click.Path())
 @click.argument("after", type=click.Path())
 @file_options.weld
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@shared.as_json
 def metrics(before: str, after: str, weld: float | None, as_json: bool) -> None:
     """Print metrics of the surface AFTER, relative to the surface BEFORE.
 
     If AFTER is flat (constant z) and has the same faces as BEFORE, the metrics of a flat
     pattern of BEFORE are printed too.
     """
-    import json
-
     from gso.cli import report
 
     design, result = file_options.load(before, weld), file_options.load(after, weld)
     values, notes = _compare(design, result)
     if as_json:
         record = {"before": before, "after": after, "metrics": values, "notes": notes}
-        click.echo(json.dumps(record, indent=2, ensure_ascii=False))
+        shared.tell_json(record)
         return
     click.echo("\n".join(report.table(values)))
     for note in notes:
@@ -81,14 +80,15 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
 )
 @click.argument("names", metavar="FILE...", nargs=-1, required=True, type=click.Path())
 @file_options.weld
-def info(names: tuple[str, ...], weld: float | None) -> None:
-    """Print properties of mesh files: size, connectivity, curvature.
+@shared.as_json
+def info(names: tuple[str, ...], weld: float | None, as_json: bool) -> None:
+    """Print properties of mesh files: size, connectivity, curvature. - is standard input.
 
     If a file cannot be read, an error is printed for it and the exit code is 1.
     """
     from gso.cli import report
 
-    failed = False
+    failed, found = False, []
     for number, file in enumerate(names):
         try:
             rows = _facts(file_options.load(file, weld))
@@ -96,10 +96,17 @@ def info(names: tuple[str, ...], weld: float | None) -> None:
             click.echo(f"gso: error: {' '.join(str(error).split())}", err=True)
             failed = True
             continue
+        if as_json:
+            facts = {name: value for name, value in rows if name != "note"}
+            notes = [value for name, value in rows if name == "note"]
+            found.append({"file": file, **facts, "notes": notes})
+            continue
         if number:
             click.echo()
         click.echo(file)
         click.echo("\n".join(f"  {line}" for line in report.columns(rows)))
+    if as_json:
+        shared.tell_json(found)
     if failed:
         click.get_current_context().exit(1)
 

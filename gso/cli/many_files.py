@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gso.cli import progress, report
+from gso.cli import shared_options as shared
 from gso.errors import GSOError, MeshError, OptionError
 from gso.io.json_file import write_json
 
@@ -27,6 +28,7 @@ def many(
     table: str | None,
     workers: int | None,
     scheduler: str | None = None,
+    as_json: bool = False,
 ) -> bool:
     """Optimise files into a folder, and return whether all results are usable."""
     outs = _outputs(files, folder, suffix)
@@ -50,17 +52,20 @@ def many(
                     raise MeshError(item.error or "failed")
                 job.write(item.result, out, pictures[item.index])
                 done = report.record(file, out, item.result, job.named)
-                if not (job.quiet and done["usable"]):
+                if not as_json and not (job.quiet and done["usable"]):
                     bar.write(report.line(done), file=sys.stderr if job.quiet else sys.stdout)
             except GSOError as error:
                 done = {"input": file, "usable": False, "error": str(error)}
                 bar.write(f"gso: error: {_named(file, str(error))}", file=sys.stderr)
             records[item.index] = done
             bar.update(1)
+    ordered = [records[k] for k in sorted(records)]
     if table is not None:
-        write_json(table, [records[k] for k in sorted(records)])
+        write_json(table, ordered)
+    if as_json:
+        shared.tell_json(ordered)
     good = sum(bool(r["usable"]) for r in records.values())
-    if not job.quiet:
+    if not job.quiet and not as_json:
         click.echo(f"{good} of {len(files)} results usable")
     return good == len(files)
 

@@ -75,13 +75,15 @@ from gso.errors import OptionError
 @file_options.weld
 @file_options.chord
 @file_options.force
+@shared.as_json
 @shared.quiet
-def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
+def optimize(names: tuple[str, ...], out: str, as_json: bool, **given: Any) -> None:
     """Optimise the surface IN and write it to OUT.
 
     Several inputs are processed in parallel; OUT, and the PNG of --plot, are then folders. With
-    --max-deviation alone, the largest strain must be 0.5 % or less. The exit code is 0 only if all
-    results are usable; otherwise the reasons are printed, with their places.
+    --max-deviation alone, the largest strain must be 0.5 % or less. IN and OUT may be -, for
+    standard input and output (OBJ). The exit code is 0 only if all results are usable; otherwise
+    the reasons are printed, with their places.
     """
     if given["net"] is not None and given["method"] in ("auto", "tno"):
         raise OptionError("--net goes with --method net or hybrid")
@@ -91,13 +93,13 @@ def optimize(names: tuple[str, ...], out: str, **given: Any) -> None:
         from gso.cli.many_files import many
 
         spread = ("suffix", "plot", "table", "workers", "scheduler")
-        good = many(job, names, out, **{option: given[option] for option in spread})
+        good = many(job, names, out, as_json=as_json, **{k: given[k] for k in spread})
     else:
         if given["suffix"] is not None:
             raise OptionError("--suffix is for many inputs; name the format in -o")
         if given["scheduler"] is not None:
             raise OptionError("--scheduler is for many inputs; leave it out")
-        good = single(job, names[0], out, given["plot"], given["table"])
+        good = single(job, names[0], out, given["plot"], given["table"], as_json)
     click.get_current_context().exit(0 if good else 1)
 
 

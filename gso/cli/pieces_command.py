@@ -55,12 +55,14 @@ if TYPE_CHECKING:
 @file_options.weld
 @file_options.chord
 @file_options.force
+@shared.as_json
 @shared.quiet
 def pieces(
     name: str,
     folder: str,
     weld: float | None,
     force: bool,
+    as_json: bool,
     quiet: bool,
     keep_groups: bool,
     denoise: bool,
@@ -80,7 +82,7 @@ def pieces(
     from gso.cli.progress import words
     from gso.seams import Groups
     from gso.seams import pieces as search
-    from gso.seams.piece_files import save
+    from gso.seams.piece_files import record, save
 
     if denoise and denoise_auto:
         raise OptionError("--denoise and --denoise-auto exclude each other; give one of them")
@@ -102,7 +104,10 @@ def pieces(
             plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
         except ImportError as error:
             click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
-    shared.tell(text(found, given["unit"]), quiet=quiet)
+    if as_json:
+        shared.tell_json(record(found, given["unit"]))
+    else:
+        shared.tell(text(found, given["unit"]), quiet=quiet)
     click.get_current_context().exit(0 if found.usable else 1)
 
 

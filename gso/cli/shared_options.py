@@ -261,16 +261,33 @@ table = click.option(
 )
 
 
+as_json = click.option(
+    "--json", "as_json", is_flag=True, help="Print JSON instead of text: what was measured."
+)
+
+
 def named_unit(unit: str) -> str:
     """Return the unit if the user gave ``--unit``, else ""."""
     source = click.get_current_context().get_parameter_source("unit")
     return unit if source is click.core.ParameterSource.COMMANDLINE else ""
 
 
-def tell(lines: Iterable[str], *, quiet: bool) -> None:
-    """Print lines; quietly only those that say why a result is not usable, as errors."""
+def tell(lines: Iterable[str], *, quiet: bool, aside: bool = False) -> None:
+    """Print lines; quietly only those that say why a result is not usable, as errors.
+
+    With `aside` all go to standard error, since standard output has something else.
+    """
     for line in lines:
         if not quiet:
-            click.echo(line)
+            click.echo(line, err=aside)
         elif line.startswith("not usable"):
             click.echo(line, err=True)
+
+
+def tell_json(record: object) -> None:
+    """Print a record as JSON."""
+    import json
+
+    from gso.io.json_file import plain
+
+    click.echo(json.dumps(plain(record), indent=2, ensure_ascii=False))

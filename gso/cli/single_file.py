@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
-from gso.errors import MeshError
+from gso.errors import MeshError, OptionError
 
 if TYPE_CHECKING:
     from gso.cli.optimize_job import Job
@@ -15,25 +15,40 @@ if TYPE_CHECKING:
 _SMALL = 20_000
 
 
-def single(job: Job, file: str, out: str, plot: str | None, table: str | None) -> bool:
+def single(
+    job: Job, file: str, out: str, plot: str | None, table: str | None, as_json: bool = False
+) -> bool:
     """Solve for one file, and return whether the result is usable."""
+    if out == file_options.STANDARD and as_json:
+        raise OptionError("-o - and --json would both write to standard output; give one of them")
+    with file_options.written(out) as path:
+        return _single(job, file, out, path, plot, table, as_json)
+
+
+def _single(
+    job: Job, file: str, out: str, path: str, plot: str | None, table: str | None, as_json: bool
+) -> bool:
     from gso.cli import report
     from gso.cli.progress import iterations
     from gso.io.json_file import write_json
     from gso.solver import loops
 
-    job.check(out, plot)
-    job.spare([file], out, plot, table)
+    job.check(path, plot)
+    job.spare([file], path, plot, table)
     mesh = file_options.load(file, job.weld)
-    if out.lower().endswith(".npy") and mesh.grid_shape is None:
+    if path.lower().endswith(".npy") and mesh.grid_shape is None:
         raise MeshError(f"{out}: the mesh is no grid, which is all that .npy holds; use .npz")
     # For one solve of a small mesh, loading compiled loops takes longer than they save.
     small = len(mesh.vertices) <= _SMALL
     with iterations() as callback, report.status_only(), loops.without(small):
         result = job.solve(mesh, callback=callback)
-    job.write(result, out, plot)
+    job.write(result, path, plot)
     record = report.record(file, out, result, job.named)
     if table is not None:
         write_json(table, record)
-    shared.tell(report.text(record).splitlines(), quiet=job.quiet)
+    if as_json:
+        shared.tell_json(record)
+    else:
+        aside = out == file_options.STANDARD
+        shared.tell(report.text(record).splitlines(), quiet=job.quiet, aside=aside)
     return bool(record["usable"])

@@ -92,10 +92,12 @@ class _StripsJob(Job):
 @file_options.weld
 @file_options.chord
 @file_options.force
+@shared.as_json
 @shared.quiet
 def strips(
     name: str,
     out: str,
+    as_json: bool,
     plot: str | None,
     table: str | None,
     constraints: str | None,
@@ -126,4 +128,4 @@ def strips(
         said = f"--{option.replace('_', '-')}"
         given[option] = file_options.lines(said, given[option])
     job = _StripsJob.of(given, own, *read)
-    click.get_current_context().exit(0 if single(job, name, out, plot, table) else 1)
+    click.get_current_context().exit(0 if single(job, name, out, plot, table, as_json) else 1)

@@ -13,6 +13,7 @@ from gso.cli.commands import Command
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
+    from gso.typing import Ints, Json
     from gso.unfolding import Net
     from gso.workshop import Drawing, Finish
 
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
 @file_options.weld
 @file_options.chord
 @file_options.force
+@shared.as_json
 @shared.quiet
 def unfold(
     name: str,
@@ -75,6 +77,7 @@ def unfold(
     up: str,
     weld: float | None,
     force: bool,
+    as_json: bool,
     quiet: bool,
 ) -> None:
     """Cut the surface IN along edges, lay its flat faces out, and draw them to OUT.
@@ -124,7 +127,9 @@ def unfold(
     options = {} if paper is None else {"paper": paper}
     drawing, bare = drawn(net, Path(name).stem, unit, finish)
     writers.write(drawing, out, **options)
-    if not quiet:
+    if as_json:
+        shared.tell_json(record(net, unit) | {"output": out, "notes": bare})
+    elif not quiet:
         click.echo("\n".join([*text(net, unit), *(f"note: {note}" for note in bare)]))
 
 
@@ -140,15 +145,34 @@ def drawn(net: Net, name: str, unit: str, finish: Finish) -> tuple[Drawing, list
     return beside(parts), without_tabs(bare)
 
 
-def text(net: Net, unit: str) -> list[str]:
-    """Format what was made as a table."""
-    import numpy as np
+def record(net: Net, unit: str) -> Json:
+    """Return what was made as plain numbers; areas and lengths are in the unit."""
+    return {
+        "unit": unit,
+        "parts": [
+            {"part": k + 1, "area": area, "folds": int(folds)}
+            for k, (area, folds) in enumerate(zip(net.areas.tolist(), _folds(net), strict=True))
+        ],
+        "mountain": int((net.angles > 0).sum()),
+        "valley": int((net.angles <= 0).sum()),
+        "cut_length": net.cut_length,
+    }
 
-    from gso.cli.report import columns
+
+def _folds(net: Net) -> Ints:
+    """Return the number of folds of each part."""
+    import numpy as np
 
     part = np.empty(len(net.pattern.flat), np.int64)
     part[net.pattern.faces] = net.part[:, None]
-    folds = np.bincount(part[net.folds.edges[:, 0]], minlength=len(net))
+    return np.bincount(part[net.folds.edges[:, 0]], minlength=len(net))
+
+
+def text(net: Net, unit: str) -> list[str]:
+    """Format what was made as a table."""
+    from gso.cli.report import columns
+
+    folds = _folds(net)
     rows: list[tuple[str, ...]] = [("part", f"area {unit}2", "folds")]
     for k, area in enumerate(net.areas.tolist()):
         rows.append((str(k + 1), f"{area:.6g}", str(folds[k])))

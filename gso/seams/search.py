@@ -46,6 +46,7 @@ from gso.seams.tree import Ground
 from gso.typing import Array, Ints, MeshLike
 from gso.unfolding.manifold import edges_between, manifold_mesh
 from gso.verdict import crosses_itself
+from gso.wording import logged
 
 #: Seams that stay: what :func:`gso.cut` takes, or an earlier result for the same mesh.
 Kept: TypeAlias = "Seam | Iterable[Seam] | ArrayLike | Pieces | None"
@@ -211,7 +212,7 @@ def pieces(
         min_neck=length(min_neck, "min_neck"),
         min_size=length(min_size, "min_size"),
         max_size=as_sheet(sheet, unit),
-        say=callback or (lambda said: None),
+        say=logged(callback),
         effort=effort_named(effort),
     )
     if symmetric not in (False, True, "mirror"):

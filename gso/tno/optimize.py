@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 import warnings
 from collections.abc import Sequence
@@ -25,6 +26,8 @@ from gso.tasks.base import Options
 from gso.tasks.request import OwnTerms, Request, checked_terms
 from gso.tasks.start import Start
 from gso.typing import MeshLike
+
+_log = logging.getLogger("gso")
 
 
 def optimize(
@@ -163,7 +166,9 @@ def optimize(
     else:
         design.check_joined()
         result = solve_mesh(request, design, constraints, callback)
-    result.seconds["total"] = time.perf_counter() - clock
+    spent = result.seconds["total"] = time.perf_counter() - clock
+    what = f"{result.task} by {result.formulation!r}"
+    _log.info("%s: %d iterations in %.3g s, %s", what, result.iterations, spent, result.status)
     if said := warning(result):
         warnings.warn(said, ConvergenceWarning, stacklevel=2)
     return result

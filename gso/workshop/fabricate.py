@@ -30,7 +30,7 @@ from gso.seams.edge_prices import Avoid, Follow
 from gso.short_repr import short_repr
 from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
-from gso.wording import places
+from gso.wording import logged, places
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
@@ -259,7 +259,7 @@ def fabricate(
     if size is not None:
         checked_options(size, spacing, 0.0, rotations, seconds)
         most = finish.room(size, per_unit)
-    say = callback or (lambda said: None)
+    say = logged(callback)
     for path in filter(None, map(path_of, several(designs))):
         if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
             raise OptionError(
