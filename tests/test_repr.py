@@ -64,4 +64,4 @@ def test_solves_and_searches_are_logged(caplog):
     assert any("developable by 'curvature': " in line for line in caplog.messages)
     caplog.clear()
     gso.pieces(PANEL, max_deviation="5%", effort="draft", workers=0)
-    assert any("pieces" in line for line in caplog.messages)
+    assert any("seams" in line for line in caplog.messages)
