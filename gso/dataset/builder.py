@@ -281,7 +281,7 @@ def _opened(
         return
     from gso.tno.batched.many import planners
 
-    # They are at different labels.
+    # Workers label different surfaces at a time, so that few stages are ready together.
     with planners(device, size**2, workers, enough=0.25) as executor:
         yield executor, True
 

@@ -17,8 +17,8 @@ from gso.typing import Array, Ints
 
 #: Samples across a strip, and at least across each of several.
 _SAMPLES, _LEAST = 8, 2
-#: Distance of the continued outline from the ends of rulings up to which these count as outside
-#: the design, relative to the margin.
+#: Ends of rulings count as outside the design if they are nearer to the continued outline than
+#: this, relative to the margin.
 _OUTSIDE = 0.8
 #: Distance from the normal through the nearest point at which a point is beyond the face.
 _APART = 1e-9

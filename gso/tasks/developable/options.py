@@ -80,9 +80,9 @@ class Options(BaseOptions):
         Meshes that are not grids are solved on coarser meshes of triangles first if they have more
         vertices than this, or than four times as many under constraints.
     by_component : bool
-        Weigh each of several components that constraints join for its own size and curvature;
-        otherwise for those of the whole mesh, as for the pieces of one design. Components without
-        interior vertices then stay as they are.
+        Weigh each component by its own size and curvature, where constraints join several. If
+        False, use the size and curvature of the whole mesh, as for the pieces of one design:
+        components without interior vertices then stay as they are.
     developable_below : float
         A design whose mean |K| is below this is developable already and is returned unchanged,
         unless there are constraints, `x0` or variables "surface".

@@ -1,4 +1,4 @@
-"""An executor whose calls have their stages minimised by this process, on a device."""
+"""An executor: worker processes prepare stages, and this process minimises them on a device."""
 
 from __future__ import annotations
 
