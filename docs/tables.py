@@ -20,6 +20,7 @@ from statistics import median
 from typing import Any
 
 from gso import Options, RuledOptions, metrics, tasks
+from gso.cli import TABLE
 from gso.net import catalogue
 from gso.verdict import Code
 
@@ -51,6 +52,9 @@ def tables() -> dict[str, str]:
     found["options-strips"] = option_table(RuledOptions, shared=shared)
     for task, metric in (("developable", "K_A_r_worst"), ("flatten", "strain_mean")):
         found[f"splits-{task}"] = split_table(task, metric)
+    head = ("You have", "You type", "You get")
+    rows = [(have, f"``{words}``", get) for have, words, get in TABLE]
+    found["what-to-type"] = csv_table(head, rows, (24, 46, 30))
     if RESULTS.exists():
         found |= measured(json.loads(RESULTS.read_text(encoding="utf-8")))
     if PRESETS.exists():
