@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import html
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -39,6 +42,20 @@ def short_repr(self: Any) -> str:
     if len(lines) > LINES:
         lines = [*lines[: LINES - 1], "    ...)"]
     return "\n".join(lines)
+
+
+def html_repr(self: Any) -> str:
+    """Return what a notebook shows: the representation, and a picture where one can be drawn.
+
+    A class takes it by ``_repr_html_ = html_repr``. :mod:`gso.plot` draws the picture; it is asked
+    by its name, since it is a later layer.
+    """
+    shown = f"<pre>{html.escape(repr(self))}</pre>"
+    data: bytes | None = import_module("gso.plot").png(self)
+    if data is None:
+        return shown
+    code = base64.b64encode(data).decode()
+    return f'{shown}<img style="max-width: 100%" src="data:image/png;base64,{code}" alt="">'
 
 
 def _value(value: object) -> str:

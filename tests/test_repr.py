@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import re
 from dataclasses import fields, is_dataclass
 
 import numpy as np
@@ -49,6 +52,19 @@ def test_representations_are_short(name):
         shown = repr(found)
         assert shown.count("\n") < LINES, where
         assert len(shown) <= LINES * (WIDTH + 1), where
+
+
+@pytest.mark.parametrize("name", ["mesh", "flatten", "loft", "pieces"])
+def test_notebooks_show_a_picture(name, monkeypatch):
+    pytest.importorskip("matplotlib")
+    found = MADE[name]()
+    shown = found._repr_html_()
+    head, _, rest = shown.partition("</pre>")
+    assert html.escape(repr(found)) in head
+    data = base64.b64decode(re.search(r"base64,([^\"]+)", rest)[1])
+    assert data.startswith(b"\x89PNG") and len(data) < 1_000_000
+    monkeypatch.setattr("gso.plot.available", lambda: False)
+    assert "<img" not in found._repr_html_()
 
 
 def test_values_are_shown_by_their_kind():

@@ -26,6 +26,7 @@ from gso.mesh.validation import (
     welding_advice,
 )
 from gso.mesh.welding import seams
+from gso.short_repr import html_repr
 from gso.typing import Array, Flags, Ints
 
 
@@ -147,6 +148,8 @@ class Mesh:
             notes=self.notes + tuple(notes),
         )
         return other
+
+    _repr_html_ = html_repr
 
     def __repr__(self) -> str:
         if self.grid_shape:

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ from gso.plot.draw import SUFFIXES, Panel, available, draw, facing, require, tur
 from gso.plot.heat import Heat, Scale, curvatures, distance, numbers, scales, strain, stretch
 from gso.plot.picture_panels import gauss, pieces, ruled, strips
 from gso.result import Result
+from gso.ruled.ruled_surface import RuledSurface
 from gso.seams import Segmentation
 from gso.spelling import choices
 from gso.typing import AnyPath, MeshLike
@@ -46,13 +48,18 @@ __all__ = [
     "distance",
     "draw",
     "numbers",
+    "picture",
     "plot_pieces",
     "plot_result",
     "plot_rulings",
     "plot_surface",
+    "png",
     "require",
     "strain",
 ]
+
+#: Dots per inch of pictures in notebooks.
+_DPI = 80
 
 COLOURS = ("curvature", "distance", "strain", "none")
 """Names that :func:`plot_surface` takes for its values."""
@@ -273,3 +280,37 @@ def plot_rulings(
     if before is not None:
         panels.insert(0, gauss(as_mesh(before), view, "Gauss image before"))
     return write(draw(panels), path)
+
+
+def picture(found: object) -> Figure | None:
+    """Draw a mesh, a result, pieces or a ruled surface, whatever it is; None for something else.
+
+    Raises
+    ------
+    GSOError
+        Matplotlib is not installed.
+
+    Examples
+    --------
+    >>> picture("a text") is None
+    True
+    """
+    if isinstance(found, Result):
+        return plot_result(found)
+    if isinstance(found, Segmentation):
+        return plot_pieces(found)
+    if isinstance(found, RuledSurface):
+        return plot_surface(found.mesh)
+    return plot_surface(found) if isinstance(found, Mesh) else None
+
+
+def png(found: object) -> bytes | None:
+    """Return the picture of an object as a PNG; None if there is none, or no Matplotlib."""
+    if not available():
+        return None
+    figure = picture(found)
+    if figure is None:
+        return None
+    data = BytesIO()
+    figure.savefig(data, format="png", dpi=_DPI)
+    return data.getvalue()

@@ -12,6 +12,7 @@ import numpy as np
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern
+from gso.short_repr import html_repr
 from gso.spline import BSplineSurface
 from gso.status import Progress, Status
 from gso.typing import AnyPath, Array, Ints, Keywords
@@ -123,6 +124,8 @@ class Result:
     def __post_init__(self) -> None:
         if self.pattern is None and self.flat is not None:
             self.pattern = Pattern.whole(self.design, self.flat)
+
+    _repr_html_ = html_repr
 
     def __repr__(self) -> str:
         from gso.result.in_words import summary

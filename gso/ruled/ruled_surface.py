@@ -21,7 +21,7 @@ from gso.ruled.strip_fit import Fit, Job
 from gso.ruled.trim import trimmed
 from gso.ruled.unroll import Unrolled
 from gso.ruled.untrimmed import Untrimmed
-from gso.short_repr import short_repr
+from gso.short_repr import html_repr, short_repr
 from gso.typing import Array, Flags, Ints
 
 _Map: TypeAlias = Callable[[Array], Array]
@@ -77,6 +77,7 @@ class RuledSurface:
     strain: float | None = None
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     @property
     def strips(self) -> int:

@@ -12,6 +12,7 @@ from gso.mesh import Mesh
 from gso.pattern import Bend, Folded, Pattern
 from gso.result import Result
 from gso.seams.sheets import Sheet
+from gso.short_repr import html_repr
 from gso.typing import AnyPath, Array, Ints, Json
 from gso.verdict import Reason
 
@@ -163,6 +164,8 @@ class Segmentation(Pieces):
         from gso.seams.piece_files import save
 
         return save(self, folder, unit)
+
+    _repr_html_ = html_repr
 
     def __repr__(self) -> str:
         said = f"{len(self)} pieces, seam {self.seam_length:.3g}"
