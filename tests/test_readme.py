@@ -27,7 +27,7 @@ GUIDE, REFERENCE, WORKSHOP = (
 )
 #: Pages whose commands run.
 SHOWN = (README, GUIDE, WORKSHOP)
-PAGES = [README, *sorted((ROOT / "docs").glob("*.rst"))]
+PAGES = [README, ROOT / "CONTRIBUTING.rst", *sorted((ROOT / "docs").glob("*.rst"))]
 
 
 def blocks(page, language):
@@ -75,6 +75,9 @@ def test_python_blocks_run(page, workshop, monkeypatch):
         assert scope["held"].metrics["distance_max"] <= 10.0 / scope["mesh"].diagonal * (1 + 1e-6)
         assert scope["aimed"].metrics["loss_gc_worst"] <= 0.02 * (1 + 0.05)
         assert scope["strained"].metrics["strain_max"] <= 0.002 * (1 + 1e-6)
+    if page.stem == "CONTRIBUTING":
+        plain, low = (scope[name].mesh.vertices[:, 2].std() for name in ("plain", "low"))
+        assert low < 0.9 * plain
     if page.stem == "extending":
         before = scope["problem"].by_term(scope["noisy"].vertices.ravel())["planarity"]
         assert scope["problem"].by_term(scope["solution"].x)["planarity"] < 0.1 * before
