@@ -52,7 +52,7 @@ def workshop(tmp_path, monkeypatch):
     panel = ROOT / "examples" / "panel.obj"
     for target in ("examples/panel.obj", "panel.obj", "panels/a.obj"):
         shutil.copy(panel, tmp_path / target)
-    for name in ("bracket.obj", "house.obj"):
+    for name in ("bracket.obj", "house.obj", "dinghy.csv"):
         shutil.copy(ROOT / "examples" / name, tmp_path / "examples")
     mesh = gso.load(panel)
     noise = np.random.default_rng(0).normal(scale=0.005, size=mesh.vertices.shape)

@@ -9,6 +9,7 @@ from gso.cli.completion import completion
 from gso.cli.dataset import dataset
 from gso.cli.fabricate_command import fabricate
 from gso.cli.inspect import info, metrics, plot
+from gso.cli.loft_command import loft
 from gso.cli.optimize_command import optimize
 from gso.cli.pieces_command import pieces
 from gso.cli.strips_command import strips
@@ -73,6 +74,6 @@ def main(ctx: click.Context) -> None:
         click.echo(f"{overview()}\n\ngso COMMAND --help says more; gso --help lists all commands.")
 
 
-_COMMANDS = (optimize, strips, pieces, unfold, metrics, info, plot, dataset, fabricate, train)
-for _command in (*_COMMANDS, completion):
+_SURFACES = (optimize, strips, pieces, unfold, loft, fabricate, metrics, info, plot)
+for _command in (*_SURFACES, dataset, train, completion):
     main.add_command(_command)

@@ -35,6 +35,7 @@ from gso.io.cad import (
 from gso.io.convert import as_mesh, as_surface
 from gso.io.flat_svg import save_flat
 from gso.io.lines import save_lines
+from gso.io.offsets import read_offsets
 from gso.io.raw_surface import Surface, welded
 from gso.io.raw_surface import checked as checked_weld
 from gso.io.source import read_bytes
@@ -58,6 +59,7 @@ __all__ = [
     "checked_weld",
     "left_out",
     "load",
+    "read_offsets",
     "read_surface",
     "replacing",
     "save",

@@ -13,6 +13,7 @@ from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
+from gso.workshop.hull_panels import HullPanel, hull_panels, whole_hull
 from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
@@ -29,6 +30,7 @@ __all__ = [
     "FabricationSettings",
     "Finish",
     "GuideLine",
+    "HullPanel",
     "Label",
     "Notch",
     "Panel",
@@ -39,6 +41,7 @@ __all__ = [
     "designs_of",
     "fitted",
     "guide_lines",
+    "hull_panels",
     "made",
     "nest",
     "of_net",
@@ -47,6 +50,7 @@ __all__ = [
     "parts_from",
     "thickened",
     "united",
+    "whole_hull",
     "with_tabs",
     "without_tabs",
 ]
