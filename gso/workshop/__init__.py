@@ -13,7 +13,7 @@ from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.hull_panels import HullPanel, hull_panels, whole_hull
+from gso.workshop.hull import HullPanel, hull_panels, whole_hull
 from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
