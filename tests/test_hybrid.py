@@ -12,7 +12,7 @@ import gso
 from gso import IsometryOptions as JointOptions
 from gso import MeshError, OptionError, WeightsError, hybrid, tno
 from gso.hierarchy import resample
-from gso.hybrid import better_start, expected_seconds, net_saves_time
+from gso.hybrid import better_start, expected_seconds, load_seconds, net_saves_time
 from gso.mesh import Mesh
 from gso.mesh.topology import reverse
 from gso.parametrization import as_patch
@@ -660,7 +660,7 @@ def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, 
 
 @pytest.fixture
 def measurements(monkeypatch):
-    """Time proportional to the number of vertices; the net saves half of it, and takes 1 s."""
+    """Time proportional to the number of vertices; the net saves half of it, PyTorch takes 1 s."""
 
     def rows(*energies):
         sizes = (1000, 10_000, 100_000)
@@ -670,7 +670,7 @@ def measurements(monkeypatch):
         ]
 
     presets = {"balanced": rows(1.02, 1.0, 1.0), "accurate": rows(1.0, 1.01, 1.02)}
-    found = {"load": 1.0, "presets": presets}
+    found = {"load": {"torch": 1.0, "onnxruntime": 0.1}, "presets": presets}
     monkeypatch.setattr("gso.hybrid.time_model.measured", lambda: found)
 
 
@@ -695,7 +695,50 @@ def test_where_a_net_pays(measurements, size, keywords, many, expected):
     assert not net_saves_time(Mesh(mesh.vertices, mesh.triangles), "developable", keywords)
 
 
+@pytest.mark.parametrize("sparing", [True, False])
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"max_deviation": "1%"}, "within max_deviation, nets were not found to help"),
+        ({"formulation": "ruled"}, "for strips, nets were not found to help"),
+        ({}, "for designs cut into pieces, nets were not found to help"),
+    ],
+)
+def test_a_cold_start_where_nets_were_not_found_to_help(monkeypatch, keywords, words, sparing):
+    monkeypatch.setattr(
+        "gso.hybrid.solving.predictions", lambda designs, **_: [1 / 0 for _ in designs]
+    )
+    design = Mesh.from_grid(saddle(13))
+    if not keywords:
+        design = gso.cut(design, gso.seams.Path([6 * 13, 6 * 13 + 12]))
+    cold = tno.optimize(design, verdict=False, **keywords)
+    result = hybrid.solve(design, verdict=False, sparing=sparing, **keywords)
+    (item,) = hybrid.solve_many([design], workers=0, verdict=False, sparing=sparing, **keywords)
+    # With `sparing` the result is that of the optimiser, and its notes are, too.
+    said = () if sparing else (f"solved without a net: {words}",)
+    for found in (result, item.result):
+        assert same(cold, found)
+        assert (found.warm_start, found.notes) == ("cold", cold.notes + said)
+
+
+@pytest.mark.parametrize(
+    ("net", "expected"),
+    [
+        (None, False),
+        ("net-c", False),
+        ("net.onnx", True),
+        (["a.onnx", "b.onnx"], True),
+        (["a.onnx", "net-c"], False),
+    ],
+)
+def test_onnx_runtime_loads_sooner(measurements, net, expected):
+    mesh = Mesh.from_grid(saddle(128))
+    assert net_saves_time(mesh, "developable", {}, net=net) is expected
+    assert net_saves_time(mesh, "developable", {}, net=net, many=True)
+
+
 def test_measured_times_rise_with_the_size():
+    assert 0 < load_seconds("net.onnx") < load_seconds(None) < load_seconds(["a.onnx", "b"])
     for preset in ("balanced", "accurate"):
         cold, _ = zip(
             *(expected_seconds(preset, n) for n in (2000, 5000, 20_000, 100_000)), strict=True

@@ -233,6 +233,47 @@ print("torch" in sys.modules)
     assert np.abs(moved - predict(points, model=net)).max() < CLOSE
 
 
+def test_hybrid_solves_without_pytorch(tmp_path):
+    # A net of the package: starts from random weights would be dropped.
+    (twice,) = export("developable", tmp_path / "twice.onnx")
+    (once,) = export("developable", tmp_path / "once.onnx", passes=1)
+    assert [read_card(path)["onnx"]["passes"] for path in (twice, once)] == [2, 1]
+    points = saddle(64)
+    np.save(tmp_path / "points.npy", points)
+    code = f"""
+import warnings
+from gso.cli import main
+warnings.simplefilter("ignore")
+twice, once = {str(twice)!r}, {str(once)!r}
+def show(result):
+    print(result.warm_start, result.iterations, result.details.get("net"), sep=",")
+for net in (twice, once, [twice, once]):
+    show(gso.hybrid.solve(points, net=net, verdict=False))
+for polish in (2, False):
+    result = gso.hybrid.solve(points, net=twice, polish=polish, verdict=False)
+    show(result)
+np.save("alone.npy", result.mesh.vertices)
+for workers in (0, 1):
+    for item in gso.hybrid.solve_many([points], net=twice, workers=workers, verdict=False):
+        show(item.result)
+# Loading ONNX Runtime pays where PyTorch would not be worth it, or is missing.
+for preset in ("balanced", "accurate"):
+    show(gso.hybrid.solve(points, net=twice, sparing=True, options=preset, verdict=False))
+main(["optimize", "points.npy", "-o", "out.npz", "--method", "hybrid", "--net", twice, "--quiet"],
+     standalone_mode=False)
+print(gso.Result.load("out.npz").details["net"])
+print("torch" in sys.modules)
+"""
+    *said, file, loaded = run_without("torch,safetensors", code, tmp_path).splitlines()
+    starts, iterations, nets = zip(*(line.split(",", 2) for line in said), strict=True)
+    assert starts == ("net",) * 7 + ("cold", "net")
+    assert iterations[3:5] == ("2", "0") and iterations[5:7] == iterations[:1] * 2
+    assert nets[:3] == (str(twice), str(once), f"{twice}, {once}")
+    assert (file, loaded) == (str(twice), "False")
+    moved = np.load(tmp_path / "alone.npy").reshape(points.shape)
+    assert np.abs(moved - predict(points, model="developable")).max() < CLOSE
+
+
 def test_without_the_runtime(files, tmp_path):
     np.save(tmp_path / "points.npy", saddle(8))
     code = f"""

@@ -37,6 +37,10 @@ class Own:
         return [Weighted(term, self.weight)]
 
 
+def by_height(mesh):
+    return Own()(mesh)
+
+
 def triangles(points):
     return gso.Mesh(points.reshape(-1, 3), gso.Mesh.from_grid(points).triangles)
 
@@ -110,6 +114,103 @@ def test_hybrid_solves_take_terms():
     assert result.energy["own"] > 0 and own.meshes
     with pytest.raises(OptionError, match="list of callables"):
         gso.hybrid.solve(saddle(9), terms=[3])
+
+
+class TestSessions:
+    def session(self, constraints, **keywords):
+        given = {"task": "developable", "terms": [Own()]} | keywords
+        return gso.tno.Session(saddle(25), constraints=constraints, **given)
+
+    def test_the_first_solve_has_the_terms(self):
+        fixed = [gso.Fixed([0, 24])]
+        result, plain = (self.session(fixed, terms=terms).result() for terms in ([Own()], ()))
+        assert set(result.energy) == {*plain.energy, "own"}
+        z = result.design.frame.to_unit(result.mesh.vertices)[:, 2]
+        assert result.energy["own"] == pytest.approx(0.5 * np.mean(z**2), rel=1e-6)
+        assert np.ptp(result.mesh.vertices[:, 2]) < 0.9 * np.ptp(plain.mesh.vertices[:, 2])
+
+    def test_frames_and_new_constraints_keep_them(self):
+        session = self.session([gso.Fixed([0, 24]), gso.Handle([600], [[0.6, 0.5, 0.6]])])
+        plain = self.session([gso.Fixed([0, 24]), gso.Handle([600], [[0.6, 0.5, 0.6]])], terms=())
+        for each in (session, plain):
+            each.move([600], [[0.6, 0.5, 0.7]])
+            each.step(3)
+        heights = [np.abs(each.vertices[:, 2]).mean() for each in (session, plain)]
+        assert heights[0] < 0.9 * heights[1]
+        session.constrain([gso.Fixed([0, 24, 600])])
+        session.step()
+        assert session.result().energy["own"] > 0
+        # The solve from the design has them, too.
+        assert session.settle().energy["own"] > 0
+
+    def test_a_task_without_terms_says_so(self):
+        with pytest.raises(
+            OptionError, match="task 'bend' takes no terms; these do: 'developable'"
+        ):
+            self.session([gso.Fixed([0])], task="bend")
+
+
+def test_many_in_processes():
+    grids = [saddle(17), 2.0 * saddle(17)]
+    for many in (gso.tno.optimize_many, gso.hybrid.solve_many):
+        items = list(many(grids, workers=1, terms=[by_height], verdict=False))
+        assert [item.error for item in items] == [None, None]
+        # The term refers to the unit ball, so that the size of a design does not matter.
+        one, other = (item.result.energy["own"] for item in items)
+        assert one > 0 and one == pytest.approx(other, rel=1e-3)
+
+
+@pytest.mark.parametrize("many", [gso.tno.optimize_many, gso.hybrid.solve_many])
+def test_what_cannot_be_sent_is_refused_before_any_work(many):
+    def designs():
+        raise AssertionError("a design was read")
+        yield
+
+    with pytest.raises(OptionError, match=r"terms: .*lambda.* top level of a module, or .*=0"):
+        next(many(designs(), workers=1, terms=[lambda mesh: []]))
+    with pytest.raises(OptionError, match="list of callables"):
+        next(many(designs(), workers=0, terms=[3]))
+
+
+class TestBatches:
+    grids = np.stack([saddle(17), 0.7 * saddle(17) + [0.0, 0.0, 0.1], 3.0 * saddle(17)])
+
+    @pytest.fixture(autouse=True)
+    def torch(self):
+        pytest.importorskip("torch")
+
+    @pytest.mark.parametrize(
+        ("task", "own"), [("developable", by_height), ("flatten", Own(shear, "flat", 10.0))]
+    )
+    def test_results_are_those_of_single_solves(self, task, own, monkeypatch):
+        monkeypatch.setattr("gso.tno.batched.batches.optimize", None)  # no surface is solved alone
+        batch = gso.tno.optimize_batch(self.grids, task=task, terms=[own], workers=0)
+        plain = gso.tno.optimize_batch(self.grids, task=task, workers=0)
+        monkeypatch.undo()
+        for grid, result, without in zip(self.grids, batch, plain, strict=True):
+            single = gso.tno.optimize(grid, task=task, terms=[own], verdict=False)
+            assert result.energy == pytest.approx(single.energy, rel=1e-3, abs=1e-9)
+            assert result.energy["own"] > 0 and "own" not in without.energy
+
+    def test_functions_of_one_name_are_not_mistaken_for_each_other(self):
+        def build(mesh):
+            size = np.ptp(mesh.vertices[:, 2])
+
+            def residual(points, constants):
+                return (points[0][2] * size,)
+
+            return Own(residual)(mesh)
+
+        found = gso.tno.optimize_batch(self.grids, terms=[build], workers=0)
+        for grid, result in zip(self.grids, found, strict=True):
+            single = gso.tno.optimize(grid, terms=[build], verdict=False)
+            assert result.energy == pytest.approx(single.energy, rel=1e-9)
+
+    def test_refusals(self):
+        with pytest.raises(OptionError, match=r"formulation 'isometry' .* takes no terms"):
+            gso.tno.optimize_batch(self.grids, formulation="isometry", terms=[Own()])
+        with pytest.raises(OptionError, match=r"terms: .* or take workers=0"):
+            gso.tno.optimize_batch(self.grids, terms=[lambda mesh: []], workers=1)
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,14 @@ the seed, or read from a set (``data=DIR``).
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import time
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,8 @@ from gso.executors import open_executor
 from gso.hierarchy import resample
 from gso.hybrid import time_model
 from gso.io.json_file import write_json
+from gso.pipeline import add_verdict
+from gso.tasks import Limits
 from gso.tno import Start, optimize
 
 #: Task and keywords.
@@ -37,6 +41,16 @@ CASES: dict[str, Case] = {
     "isometry": ("developable", {"formulation": "isometry"}),
     "max_strain=0.5%": ("developable", {"max_strain": "0.5%"}),
 }
+#: Solves for which :func:`gso.hybrid.solve` makes no warm start: task, number of pieces into which
+#: the design is cut along lines of the grid, and keywords.
+ELSEWHERE: dict[str, tuple[str, int, dict[str, Any]]] = {
+    "max_deviation=0.5%": ("developable", 1, {"max_deviation": "0.5%"}),
+    "max_deviation=2%": ("developable", 1, {"max_deviation": "2%"}),
+    "flatten, minimax": ("flatten", 1, {"formulation": "minimax"}),
+    "2 pieces": ("developable", 2, {}),
+    "4 pieces": ("developable", 4, {}),
+    "4 strips": ("developable", 1, {"options": gso.RuledOptions(strips=4, lines=False)}),
+}
 #: Numbers of iterations at which the curve of the section "anytime" has points.
 POINTS = (0, 1, 2, 3, 4, 6, 8, 12, 18, 24)
 #: Vertices along the sides of grids of the sections "sizes" and "model", by preset, and the share
@@ -48,8 +62,22 @@ SIZES = {
 #: Share of the energy that the cold solve "ended as early" leaves to further iterations: that of
 #: :func:`gso.hybrid.solve`.
 EARLY = 3e-3
-#: A program that loads PyTorch and the default net.
-LOAD = "import numpy as np, gso; gso.net.predict(np.dstack([*np.mgrid[:9.0, :9.0], np.eye(9)]))"
+#: A program that prints the CPU seconds to load a net and the library that applies it, after a
+#: cold solve: the first prediction without the time of another one.
+LOAD = """
+import sys, time
+import numpy as np, gso
+grid = np.dstack([*np.mgrid[:9.0, :9.0], np.eye(9)])
+gso.tno.optimize(grid)
+def spent():
+    clock = time.process_time()
+    gso.net.predict(grid, model=sys.argv[1])
+    return time.process_time() - clock
+print(spent() - spent())
+"""
+#: Relative energy decrease of an iteration at which :func:`gso.hybrid.solve` ends solves other than
+#: those by curvature.
+NEARLY = 2e-3
 #: Share by which the section "guard" stretches designs along x, to measure how much the cold solves
 #: of two practically equal designs differ.
 STRETCH = 1e-6
@@ -203,12 +231,36 @@ def model(n: int = 32, data: Path | None = None) -> dict[str, Any]:
         }
         size = {"vertices": int(grid.split(" ")[0]) ** 2}
         presets[preset].append(size | {k: float(f"{v:.4g}") for k, v in row.items()})
-    runs = [timed(subprocess.run, [sys.executable, "-c", LOAD], check=True)[1] for _ in range(3)]
-    load = round(min(runs), 2)
-    write_json(time_model.FILE, {"load": load, "presets": presets})
+    _write({"presets": presets})
     rows = {(name, str(row["vertices"])): row for name in presets for row in presets[name]}
-    title = f"Model: total CPU seconds (medians), energy and strain (nine in ten); load {load} s"
-    return tabulate(title, ["preset", "vertices"], rows)
+    title = "Model: total CPU seconds (medians), energy and strain (nine in ten)"
+    return tabulate(title, ["preset", "vertices"], rows) | load()
+
+
+def load(n: int = 5) -> dict[str, Any]:
+    """Measure the time to load PyTorch and ONNX Runtime with the default net, and write it.
+
+    The file is that of :mod:`gso.hybrid.time_model`. Each of n runs is a process of its own.
+    """
+    rows = {}
+    with TemporaryDirectory() as folder:
+        (file,) = gso.net.export("developable", Path(folder, "developable.onnx"), passes=1)
+        for library, net in {"torch": "developable", "onnxruntime": str(file)}.items():
+            program = [sys.executable, "-c", LOAD, net]
+            spent = [
+                float(subprocess.check_output(program, text=True))
+                for _ in progress(range(n), library)
+            ]
+            rows[library] = {"s": round(float(np.median(spent)), 2), "least": min(spent)}
+    seconds = {library: row["s"] for library, row in rows.items()}
+    _write({"load": seconds})
+    title = f"Load: CPU seconds of the first prediction without those of the next; {n} processes"
+    return tabulate(title, ["library"], rows)
+
+
+def _write(part: dict[str, Any]) -> None:
+    """Replace a part of the file of :mod:`gso.hybrid.time_model`."""
+    write_json(time_model.FILE, {**json.loads(time_model.FILE.read_text()), **part})
 
 
 def guard(n: int = 0, data: Path | None = None) -> dict[str, Any]:
@@ -262,4 +314,60 @@ def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") ->
     return tabulate(title, ["solve", "iterations"], rows)
 
 
-SECTIONS = (speed, sizes, model, guard, anytime)
+def elsewhere(n: int = 6, data: Path | None = None, case: str = "") -> dict[str, Any]:
+    """Print time and energy from a net's result where hybrid solves start cold, on validation.
+
+    All cases, or the one that is named. "early" is a cold solve that ends as early.
+    """
+    surfaces = split("validation", data)
+    grids = [np.asarray(surfaces[k], float) for k in range(min(n, len(surfaces)))]
+    rows = {}
+    for name in [case] if case else ELSEWHERE:
+        _started_anyway(name, grids[0])  # imports and code generation of the first use
+        found = [_started_anyway(name, grid) for grid in progress(grids, name)]
+        each = {key: np.array([one[key] for one in found]) for key in found[0]}
+        rows[name] = {"n": len(found), "cold s": float(np.median(each["cold s"]))}
+        for key in ("time", "energy", "strain"):
+            rows[name] |= {key: float(np.median(each[key])), f"{key} worst": each[key].max()}
+        rows[name] |= {key: float(np.median(each[key])) for key in ("early time", "early energy")}
+        rows[name]["started %"] = 100.0 * float(each["started"].mean())
+    title = (
+        "Elsewhere: CPU time, energy and largest strain from a net's result, over the cold solve's"
+    )
+    return tabulate(title, ["case"], rows)
+
+
+def _started_anyway(name: str, grid: np.ndarray) -> dict[str, float]:
+    """Solve a grid cold, from a net's result, and cold with an earlier end."""
+    task, pieces, keywords = ELSEWHERE[name]
+    design: Any = gso.Mesh.from_grid(grid)
+    if pieces > 1:
+        lines = [design.grid_index[len(grid) // 2], design.grid_index[:, grid.shape[1] // 2]]
+        edges = [np.stack([line[:-1], line[1:]], axis=1) for line in lines[: pieces // 2]]
+        design = gso.cut(design, gso.seams.Edges(np.concatenate(edges)))
+    solve = partial(optimize, design, task=task, verdict=False, **keywords)
+
+    def warm() -> gso.Result:
+        moved = gso.net.predict(grid, task=task, passes=1, guarded=False)
+        points = moved.reshape(-1, moved.shape[-1])
+        return solve(x0=Start(points, "net", guarded=True, tolerance=NEARLY))
+
+    (cold, spent), (result, seconds) = _cpu(solve), _cpu(warm)
+    early, soon = _cpu(solve, x0=Start(None, remaining=EARLY))
+    least = max(energy(cold), 1e-300)
+    for solved in (result, cold):
+        if solved.pattern is None:
+            quietly(add_verdict, solved, Limits())
+    strains = [max(solved.metrics["strain_max"], 1e-9) for solved in (result, cold)]
+    return {
+        "cold s": spent,
+        "time": seconds / spent,
+        "energy": energy(result) / least,
+        "strain": strains[0] / strains[1],
+        "early time": soon / spent,
+        "early energy": energy(early) / least,
+        "started": result.warm_start == "net",
+    }
+
+
+SECTIONS = (speed, sizes, model, load, guard, anytime, elsewhere)

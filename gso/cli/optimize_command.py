@@ -61,7 +61,9 @@ from gso.errors import OptionError
     "use, the optimiser does, and a note says so.",
 )
 @click.option(
-    "--net", metavar="NET", help="Name or .safetensors file; the task's own net by default."
+    "--net",
+    metavar="NET",
+    help="Name, or .safetensors or .onnx file; the task's own net by default.",
 )
 @click.option("--backend", metavar="NAME", help="Linear solver; the fastest installed by default.")
 @shared.workers

@@ -53,6 +53,9 @@ class Executor(ABC):
     def submit(self, function: Callable[..., R], *given: object) -> Future[R]:
         """Schedule a call; an executor that is closed raises an OptionError."""
 
+    def check_sent(self, option: str, functions: Iterable[object]) -> None:  # noqa: B027
+        """Raise an OptionError that names an option if its functions cannot be sent to workers."""
+
     def interrupt(self) -> None:  # noqa: B027, there may be nothing to end
         """End the calls that are running."""
 

@@ -14,6 +14,20 @@ class Ended(BrokenExecutor):
     """The other process has ended."""
 
 
+def unsendable(value: object) -> str:
+    """Say why a value cannot be sent to another process; empty if it can.
+
+    >>> unsendable(abs), "lambda" in unsendable(lambda x: x)
+    ('', True)
+    """
+    try:
+        pickle.dumps(value, protocol=5)
+    # What a value's own methods raise has no class in common.
+    except Exception as error:
+        return str(error)
+    return ""
+
+
 def send(connection: Connection, value: object) -> None:
     """Send a value; one that cannot be pickled raises before anything is sent.
 

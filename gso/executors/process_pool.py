@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
 from multiprocessing import get_context, parent_process
@@ -20,7 +20,7 @@ from typing import Any
 
 from gso.errors import ConvergenceWarning, OptionError
 from gso.executors.base import Executor, R, T, check_workers, processors
-from gso.executors.exchange import Ended, receive, send
+from gso.executors.exchange import Ended, receive, send, unsendable
 
 #: What a message is: the result of a call, what it raised, or a request in its course.
 _RESULT, _RAISED, _ASKED = range(3)
@@ -141,6 +141,14 @@ class ProcessExecutor(Executor):
             except BrokenExecutor:
                 own[k] = function(items[k])
         return [own[k] for k in range(len(items))]
+
+    def check_sent(self, option: str, functions: Iterable[object]) -> None:
+        for function in functions:
+            if why := unsendable(function):
+                raise OptionError(
+                    f"{option}: {function!r} cannot be sent to worker processes ({why}); define it "
+                    "at the top level of a module, or take workers=0"
+                )
 
     def interrupt(self) -> None:
         with self._changing:

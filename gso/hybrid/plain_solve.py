@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
+from gso.ruled.paneling.options import RULED
 from gso.tasks.developable import Options
 from gso.tasks.options import Options as BaseOptions
 from gso.tasks.request import Request
@@ -24,6 +26,21 @@ def checked_request(task: str, keywords: Keywords) -> Request[BaseOptions]:
         As :func:`gso.tno.check`.
     """
     return check(task, **{name: keywords[name] for name in _ASKED if name in keywords})
+
+
+def without_gain(design: Mesh | Pieces, task: str, keywords: Keywords) -> str:
+    """Say why no warm start is made for a solve, whatever the design's shape; empty if one is.
+
+    ``python bench/run_all.py --only hybrid.elsewhere`` prints the measurements.
+    """
+    if isinstance(design, Pieces):
+        return "for designs cut into pieces, nets were not found to help"
+    request = checked_request(task, keywords)
+    if request.formulation == RULED:
+        return "for strips, nets were not found to help"
+    if request.limits.max_deviation is not None:
+        return "within max_deviation, nets were not found to help"
+    return ""
 
 
 def plain_options(design: Mesh, task: str, keywords: Keywords) -> Options | None:

@@ -10,16 +10,17 @@ from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from itertools import islice
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from gso import parametrization, tasks
 from gso.components import Component, several
 from gso.constraints import Compiled, compile_constraints, listed
+from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
-from gso.hybrid.plain_solve import checked_request, plain_options
+from gso.hybrid.plain_solve import checked_request, plain_options, without_gain
 from gso.hybrid.time_model import net_saves_time
 from gso.hybrid.two_starts import better_start
 from gso.hybrid.warm_start import Prediction, predictions
@@ -41,6 +42,8 @@ _BATCH = 64
 #: Passes of a net for a warm start. A solve on a coarser grid makes the large-scale changes of
 #: further passes as well, in less time.
 _PASSES = 1
+#: Whether a net is to be used for a design.
+Worth: TypeAlias = "Callable[[Mesh], bool]"
 #: Note on results that do not begin with the net's.
 _LOST = "the design's own minimum on a coarse grid is lower than that from the net's result"
 #: Shares of the energy that are left to further iterations: with less than the effort of a cold
@@ -54,7 +57,7 @@ _TWO_STARTS = (4, 2)
 
 
 def solve(
-    mesh: MeshLike,
+    mesh: MeshLike | Pieces,
     *,
     task: str = "developable",
     net: NetLike | None = None,
@@ -71,24 +74,28 @@ def solve(
 
     The solve is a cold start, the same as :func:`gso.tno.optimize`, in these cases:
 
-    - No net is available: none for the task, or PyTorch is not installed. Warm starts of the task
+    - No net is available: none for the task, or PyTorch is not installed, or, for an exported net
+      (a .onnx file), ONNX Runtime. Warm starts of the task
       "flatten" were not found to help.
     - The design is no grid: warm starts of other meshes were not found to help. It is small, or
       has far more curvature than the training data.
+    - The design is cut into pieces, or `max_deviation` or the formulation "ruled" is asked for:
+      warm starts were not found to help there.
     - The net's result is not finite, or has a higher energy than the cold start.
 
     The result's `notes` then say so, and its `warm_start` is "cold".
 
     Parameters
     ----------
-    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
+    mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, path, or Pieces
         The design. With ``polish=False`` nets take components with a boundary and without
         handles, too: these are resampled to a grid, and the displacement is interpolated back.
     task : str
         As for :func:`gso.tno.optimize`; nets make starts for "developable". Those for "flatten"
         and "denoise" are used only with ``polish=False``.
     net : str, path or net, optional
-        As `model` of :func:`gso.net.predict`; the task's default when not given.
+        As `model` of :func:`gso.net.predict`; the task's default when not given. Exported nets
+        are applied in the number of passes that they were exported with.
     polish : bool or int
         True: solve from the net's result, as `effort` says. A number: at most so many
         iterations, with or without a net.
@@ -133,16 +140,21 @@ def solve(
     clock = time.perf_counter()
     polish = _checked(task, polish, keywords)
     effort = as_positive(effort, "effort")
-    design = as_mesh(mesh)
+    design = mesh if isinstance(mesh, Pieces) else as_mesh(mesh)
+    why = _without_gain(design, task, polish, keywords)
+    if isinstance(design, Pieces) or why:
+        refused = Prediction(refused="" if sparing else why)
+        return _finished(design, refused, task, polish, effort, keywords)
     design.check_joined()
-    pieces = _pieces(design, task, sparing, keywords)
+    worth = partial(net_saves_time, task=task, keywords=keywords, net=net) if sparing else None
+    pieces = _pieces(design, task, worth, keywords)
     if pieces:
         further = {"net": net, "polish": polish, "effort": effort}
         result = _each(design, pieces, task, keywords | further)
         result.seconds["total"] = time.perf_counter() - clock
         return result
     prediction = Prediction()
-    if not sparing or net_saves_time(design, task, keywords):
+    if worth is None or worth(design):
         (prediction,) = predictions(
             [design], task=task, net=net, passes=_passes(polish), alone=polish is False
         )
@@ -152,7 +164,7 @@ def solve(
 
 
 def solve_many(
-    meshes: Iterable[MeshLike],
+    meshes: Iterable[MeshLike | Pieces],
     *,
     task: str = "developable",
     net: NetLike | None = None,
@@ -171,7 +183,8 @@ def solve_many(
     meshes : iterable
         Anything :func:`solve` takes; read in blocks, so that a generator of any length fits.
     task, net, polish, sparing, effort, **keywords
-        As for :func:`solve`; a `callback` is ignored.
+        As for :func:`solve`; a `callback` is ignored. Worker processes need the functions of
+        `terms` at the top level of a module.
     workers : int, optional
         Number of worker processes; the number of cores when not given, 0 to solve in this one.
     scheduler : str, optional
@@ -194,23 +207,27 @@ def solve_many(
     keywords.pop("callback", None)
     polish = _checked(task, polish, keywords)
     work = partial(_one, task, polish, as_positive(effort, "effort"), keywords)
-    worth = partial(net_saves_time, task=task, keywords=keywords, many=True) if sparing else None
+    worth: Worth | None = None
+    if sparing:
+        worth = partial(net_saves_time, task=task, keywords=keywords, net=net, many=True)
     passes, alone = _passes(polish), polish is False
     ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
-    started = _started(meshes, worth, ask)
+    refuse = partial(_without_gain, task=task, polish=polish, keywords=keywords)
+    started = _started(meshes, refuse, worth, ask)
     own = nullcontext(executor) if executor else open_executor(workers, scheduler, main=True)
     with own as ready:
+        ready.check_sent("terms", keywords.get("terms", ()))
         yield from ready.as_completed(work, started)
 
 
-def _pieces(design: Mesh, task: str, sparing: bool, keywords: Keywords) -> list[Component]:
+def _pieces(design: Mesh, task: str, worth: Worth | None, keywords: Keywords) -> list[Component]:
     """Return the components that are predicted one by one; none for the design as a whole."""
     if not several(design):
         return []
     flat = tasks.get(task).flat
     compiled = compile_constraints(keywords["constraints"], design, flat=flat)
     pieces = component_solves.parts(design, compiled)
-    if sparing and not any(net_saves_time(piece.mesh, task, keywords) for piece in pieces):
+    if worth is not None and not any(worth(piece.mesh) for piece in pieces):
         return []
     keywords["constraints"] = compiled
     return pieces
@@ -242,24 +259,42 @@ def _each(design: Mesh, pieces: list[Component], task: str, keywords: Keywords) 
 class _Started:
     """A design, or the error on reading it, with its prediction."""
 
-    design: Mesh | GSOError
+    design: Mesh | Pieces | GSOError
     prediction: Prediction
 
 
 def _started(
-    meshes: Iterable[MeshLike],
-    worth: Callable[[Mesh], bool] | None,
+    meshes: Iterable[MeshLike | Pieces],
+    refuse: Callable[[Mesh | Pieces], str],
+    worth: Worth | None,
     ask: Callable[[list[Mesh]], list[Prediction]],
 ) -> Iterator[_Started]:
-    """Read designs block by block, and predict those for which `worth` is true."""
+    """Read designs block by block, and predict those for which `worth` is true.
+
+    Without it, those are predicted that `refuse` names no reason against.
+    """
     source = iter(meshes)
     while block := list(islice(source, _BATCH)):
         read = [_read(mesh) for mesh in block]
-        seen = [isinstance(d, Mesh) and (worth is None or worth(d)) for d in read]
-        chosen = [d for d, s in zip(read, seen, strict=True) if s and isinstance(d, Mesh)]
-        found = iter(ask(chosen))
-        for design, asked in zip(read, seen, strict=True):
-            yield _Started(design, next(found) if asked else Prediction())
+        why = ["" if isinstance(d, GSOError) else refuse(d) for d in read]
+        chosen = {
+            k: d
+            for k, d in enumerate(read)
+            if isinstance(d, Mesh) and not why[k] and (worth is None or worth(d))
+        }
+        found = dict(zip(chosen, ask(list(chosen.values())), strict=True))
+        for k, design in enumerate(read):
+            refused = Prediction(refused="" if worth else why[k])
+            yield _Started(design, found.get(k, refused))
+
+
+def _without_gain(design: Mesh | Pieces, task: str, polish: bool | int, keywords: Keywords) -> str:
+    """Say why no net is used, whatever the design's shape; empty if one may be.
+
+    Where the net's result itself is wanted, only pieces are a reason against it.
+    """
+    alone = polish is False and isinstance(design, Mesh)
+    return "" if alone else without_gain(design, task, keywords)
 
 
 def _passes(polish: bool | int) -> int | None:
@@ -267,9 +302,9 @@ def _passes(polish: bool | int) -> int | None:
     return _PASSES if polish is True else None
 
 
-def _read(mesh: MeshLike) -> Mesh | GSOError:
+def _read(mesh: MeshLike | Pieces) -> Mesh | Pieces | GSOError:
     try:
-        return as_mesh(mesh)
+        return mesh if isinstance(mesh, Pieces) else as_mesh(mesh)
     except GSOError as error:
         return error
 
@@ -305,7 +340,7 @@ def _checked(task: str, polish: bool | int, keywords: Keywords) -> bool | int:
 
 
 def _finished(
-    design: Mesh,
+    design: Mesh | Pieces,
     prediction: Prediction,
     task: str,
     polish: bool | int,
@@ -314,7 +349,7 @@ def _finished(
 ) -> Result:
     """Solve from a prediction if it is valid, else from a cold start."""
     refused, result = prediction.refused, None
-    if prediction.points is not None:
+    if prediction.points is not None and isinstance(design, Mesh):
         try:
             refused = _unsound(design, prediction.points)
             if not refused:

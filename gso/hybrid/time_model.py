@@ -10,6 +10,7 @@ import numpy as np
 
 from gso.hybrid.plain_solve import plain_options
 from gso.mesh import Mesh
+from gso.net.catalogue import NetLike, exported, in_turn
 from gso.typing import Array, Json, Keywords
 
 #: Measurements, which ``python bench/run_all.py --only hybrid.model`` makes anew.
@@ -21,27 +22,49 @@ _ENERGY, _STRAIN, _TIME = 1.005, 1.05, 0.95
 _PRESETS = {"normal": "balanced", "free": "accurate"}
 
 
-def net_saves_time(design: Mesh, task: str, keywords: Keywords, *, many: bool = False) -> bool:
-    """Return whether the task's net is expected to save time, at the same quality.
+def net_saves_time(
+    design: Mesh,
+    task: str,
+    keywords: Keywords,
+    *,
+    net: NetLike | None = None,
+    many: bool = False,
+) -> bool:
+    """Return whether a net is expected to save time, at the same quality.
 
-    It was measured for developable solves of grids by curvature. For other solves, and with bounds
-    or constraints, it is not expected to.
+    It was measured for developable solves of grids by curvature, with the task's own net. For other
+    solves, and with bounds or constraints, it is not expected to.
 
     Parameters
     ----------
     design : Mesh
     task, keywords
         As for :func:`gso.hybrid.solve`.
+    net : str, path, Net or sequence, optional
+        As for :func:`gso.hybrid.solve`. ONNX Runtime, which exported nets need, loads faster than
+        PyTorch.
     many : bool
-        Whether it is one of many designs, for which PyTorch is loaded once.
+        Whether it is one of many designs, for which the library and the net are loaded once.
     """
     options = plain_options(design, task, keywords)
     if options is None:
         return False
     preset = _PRESETS[options.variables]
     cold, warm = expected_seconds(preset, len(design.vertices))
-    load = 0.0 if many else float(measured()["load"])
+    load = 0.0 if many else load_seconds(net)
     return warm + load <= _TIME * cold
+
+
+def load_seconds(net: NetLike | None) -> float:
+    """Return the seconds to load nets and the libraries that they need.
+
+    >>> load_seconds("developable.onnx") < load_seconds("developable")
+    True
+    """
+    nets, seconds = in_turn(net), measured()["load"]
+    # Of several nets, the first of a library takes nearly all of its time.
+    used = {"onnxruntime" if exported(one) else "torch" for one in nets}
+    return sum(float(seconds[library]) for library in used)
 
 
 def expected_seconds(preset: str, vertices: int) -> tuple[float, float]:
@@ -75,6 +98,6 @@ def _power(at: float, sizes: Array, seconds: list[float]) -> float:
 
 @cache
 def measured() -> Json:
-    """Return the measurements: seconds to load PyTorch and a net, and rows by preset and size."""
+    """Return the measurements: seconds to load by library, and rows by preset and size."""
     found: Json = json.loads(FILE.read_text())
     return found

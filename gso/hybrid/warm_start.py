@@ -14,7 +14,7 @@ from gso.dataset.screen import CURVED
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import NetLike, available, chain, missing_packages
+from gso.net.catalogue import NetLike, available, chain, exported, in_turn, missing_packages
 from gso.typing import Array
 
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
@@ -61,7 +61,7 @@ def predictions(
     net : str, path or Net, optional
         As `model` in :func:`gso.net.predict`.
     passes : int, optional
-        As in :func:`gso.net.predict`.
+        As in :func:`gso.net.predict`; exported nets have their own number.
     alone : bool
         Whether the predictions are the final results, not warm starts.
 
@@ -72,11 +72,14 @@ def predictions(
     WeightsError
         The net that is named does not exist, or its file is damaged.
     """
-    if isinstance(net, str | Path) and task in tasks.names():
-        chain(net, task)
+    for one in in_turn(net) if task in tasks.names() else ():
+        if isinstance(one, str | Path):
+            chain(one, task)
     why = _missing(task, net, alone)
     if why:
         return [Prediction(refused=why)] * len(designs)
+    if any(map(exported, in_turn(net))):
+        passes = None
     name = _name(task, net)
     found: list[Prediction] = [Prediction()] * len(designs)
     sizes: dict[tuple[int, ...], list[tuple[int, Array]]] = {}
@@ -126,7 +129,8 @@ def _missing(task: str, net: NetLike | None, alone: bool) -> str:
 def _name(task: str, net: NetLike | None) -> str:
     if net is None:
         return tasks.get(task).default
-    return type(net).__name__ if hasattr(net, "task") else str(net)
+    several = in_turn(net)
+    return ", ".join(type(one).__name__ if hasattr(one, "task") else str(one) for one in several)
 
 
 def _check_size(design: Mesh, task: str) -> None:

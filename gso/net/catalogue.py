@@ -11,7 +11,7 @@ import json
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from gso.errors import WeightsError
 from gso.net import tasks
@@ -48,6 +48,15 @@ def exported(model: object) -> bool:
     return isinstance(model, str | Path) and Path(model).suffix == EXPORTED
 
 
+def in_turn(model: NetLike | None) -> Sequence[AnyPath | Net | None]:
+    """Return the nets that are given to be applied in turn: those of a sequence, or the one.
+
+    >>> in_turn(["net-c", "second.onnx"]), in_turn(None)
+    (['net-c', 'second.onnx'], [None])
+    """
+    return model if isinstance(model, list | tuple) else [cast("AnyPath | Net | None", model)]
+
+
 def card_of(path: AnyPath) -> Path:
     """Return the place of the card of a net's file.
 
@@ -65,13 +74,10 @@ def missing_packages(model: NetLike | None) -> str:
     model : str, path, Net or sequence
         The net; None for one that comes with the package.
     """
-    if isinstance(model, list | tuple):
-        return next((why for why in map(missing_packages, model) if why), "")
-    if exported(model):
-        if find_spec("onnxruntime") is None:
-            return 'exported nets need onnxruntime: pip install ".[onnx]" in the folder of gso'
-        return ""
-    if find_spec("torch") is None or find_spec("safetensors") is None:
+    known = [exported(one) for one in in_turn(model)]
+    if any(known) and find_spec("onnxruntime") is None:
+        return 'exported nets need onnxruntime: pip install ".[onnx]" in the folder of gso'
+    if not all(known) and (find_spec("torch") is None or find_spec("safetensors") is None):
         return (
             'nets need torch and safetensors: pip install ".[net]" in the folder of gso, or give '
             "an exported net (a .onnx file, see gso.net.export)"

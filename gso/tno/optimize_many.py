@@ -11,6 +11,7 @@ from typing import Any
 from gso.cut_pieces import Pieces
 from gso.executors import Executor, Item, open_executor
 from gso.result import Result
+from gso.tasks.request import checked_terms
 from gso.tno.optimize import optimize
 from gso.typing import Keywords, MeshLike
 
@@ -43,13 +44,19 @@ def optimize_many(
     executor : Executor, optional
         Solves instead, and stays open for other calls: :class:`gso.executors.ProcessExecutor`.
     **keywords
-        Passed to :func:`gso.tno.optimize`; a `callback` is ignored.
+        Passed to :func:`gso.tno.optimize`; a `callback` is ignored. Worker processes need the
+        functions of `terms` at the top level of a module.
 
     Yields
     ------
     Item
         In the order of completion; `index` says which input it belongs to. A surface
         that fails is reported in `error` and does not end the batch.
+
+    Raises
+    ------
+    OptionError
+        `terms` are no callables, or cannot be sent to worker processes.
 
     Examples
     --------
@@ -60,9 +67,11 @@ def optimize_many(
     """
     signature(optimize).bind(None, **keywords)
     keywords.pop("callback", None)
+    terms = checked_terms(keywords.get("terms", ()), "optimize_many", takes=True)
     if isinstance(keywords.get("constraints"), Iterator):
         # The first surface would exhaust the iterator.
         keywords["constraints"] = list(keywords["constraints"])
     own = nullcontext(executor) if executor else open_executor(workers, scheduler, main=True)
     with own as ready:
+        ready.check_sent("terms", terms)
         yield from ready.as_completed(partial(_one, keywords), meshes)

@@ -25,7 +25,7 @@ from gso.solver.augmented_lagrangian import tighten
 from gso.solver.problem import Problem
 from gso.status import Status
 from gso.tasks.base import Options, Plan, Stage
-from gso.tasks.request import check
+from gso.tasks.request import OwnTerms, check
 from gso.tasks.start import Start
 from gso.typing import Array, Ints, MeshLike
 from gso.unknowns import control_points
@@ -52,8 +52,9 @@ class Session:
     ----------
     mesh : Mesh, array (H, W, 3), (vertices, faces), trimesh.Trimesh, or path
         The design, in any unit of length.
-    task, formulation, options, x0
-        As for :func:`gso.tno.optimize`; a task whose result is a surface.
+    task, formulation, options, x0, terms
+        As for :func:`gso.tno.optimize`; a task whose result is a surface. The terms are built
+        again for each :meth:`constrain` and :meth:`settle`. "bend", the default, takes none.
     constraints : sequence of Constraint
         Constraints on the surface, among them the handles that can be moved.
 
@@ -93,12 +94,13 @@ class Session:
         options: str | Options | None = None,
         constraints: Sequence[Constraint] = (),
         x0: MeshLike | Start | None = None,
+        terms: Sequence[OwnTerms] = (),
     ):
         from gso.io import as_mesh
 
         design = as_mesh(mesh)
         design.check_joined()
-        self._case = Case(check(task, formulation, options, x0=x0), design)
+        self._case = Case(check(task, formulation, options, x0=x0, terms=terms), design)
         if self._case.task.flat:
             raise OptionError(f"task {task!r} makes no surface that handles could move")
         self._options = self._case.solver_request.options

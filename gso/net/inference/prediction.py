@@ -15,7 +15,7 @@ from gso.errors import BackendError, MeshError, OptionError
 from gso.hierarchy import resample
 from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import SIZE, NetLike, chain, exported, missing_packages
+from gso.net.catalogue import SIZE, NetLike, chain, exported, in_turn, missing_packages
 from gso.net.inference import denoising
 from gso.net.inference.applied_net import AppliedNet
 from gso.net.inference.harm import harmless
@@ -232,7 +232,7 @@ def _predicted(
 
 def _nets(model: NetLike | None, task: str, device: str | None) -> list[AppliedNet]:
     """Make the nets ready that are applied one after the other."""
-    several = model if isinstance(model, list | tuple) else (model,)
+    several = in_turn(model)
     if not several:
         raise OptionError("model is an empty sequence; give at least one net")
     if why := missing_packages(model):

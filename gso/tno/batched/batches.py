@@ -17,7 +17,7 @@ from gso.pipeline.judgement import conclude
 from gso.pipeline.run import Run
 from gso.result import Result
 from gso.tasks.base import Options, Plan
-from gso.tasks.request import Request
+from gso.tasks.request import OwnTerms, Request
 from gso.tno.batched import stage_groups
 from gso.tno.batched.stage_batch import TooLarge, Unbatchable
 from gso.tno.batched.stage_groups import Minimise, Structure
@@ -51,6 +51,7 @@ def check_batch(
     options: str | Options | None = None,
     device: str = "cpu",
     verdict: bool = False,
+    terms: Sequence[OwnTerms] = (),
 ) -> BatchRequest:
     """Check what a batch is asked for, but for its device.
 
@@ -59,7 +60,7 @@ def check_batch(
     OptionError
         Something is unknown, or has no batched solve.
     """
-    request = check(task, formulation, options, verdict=verdict)
+    request = check(task, formulation, options, verdict=verdict, terms=terms)
     if request.formulation not in FORMULATIONS.get(task, ()):
         there = "; ".join(f"{name}: {', '.join(some)}" for name, some in FORMULATIONS.items())
         raise OptionError(
@@ -143,6 +144,7 @@ def _solve_alone(request: Request[Options], given: MeshLike) -> Result | GSOErro
                 task=request.task,
                 formulation=request.formulation,
                 options=request.options,
+                terms=request.terms,
                 verdict=request.verdict,
             )
     except GSOError as error:

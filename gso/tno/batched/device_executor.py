@@ -58,6 +58,9 @@ class DeviceExecutor(Executor):
     def submit(self, function: Callable[..., R], *given: object) -> Future[R]:
         return self._processes.schedule(self._call, function, *given)
 
+    def check_sent(self, option: str, functions: Iterable[object]) -> None:
+        self._processes.check_sent(option, functions)
+
     def interrupt(self) -> None:
         self.shutdown()
         self._processes.interrupt()

@@ -46,6 +46,10 @@ def solve_all(
     vertices = max(np.size(first.vertices if isinstance(first, Mesh) else first) // 3, 1)
     here = _on_processor(batch.device)
     most = _BATCH if here else max(_VERTICES // vertices, 1)
+    own_terms = batch.request.terms
+    if executor is None and workers is None and own_terms:
+        # The user's functions may not be sent to other processes.
+        workers = 0
     if executor is None and workers is None:
         parts, enough = (-(-count // most), _ENOUGH) if here else (count, _GPU_ENOUGH)
         workers = useful_workers(parts) if parts >= enough else 0
@@ -54,14 +58,17 @@ def solve_all(
         for k in range(0, count, together):
             yield from _batch(batch, designs[k : k + together])
     elif here:
-        with nullcontext(executor) if executor else open_executor(workers) as ready:
+        opened = nullcontext(executor) if executor else open_executor(workers, main=bool(own_terms))
+        with opened as ready:
+            ready.check_sent("terms", own_terms)
             # Smaller pieces where they leave no process without work.
             own = max(ready.workers, 1)
             share = -(-count // (own * -(-count // (most * own))))
             pieces = [designs[k : k + share] for k in range(0, count, share)]
             yield from _in_order(ready.as_completed(partial(_measured, batch), pieces), share)
     else:
-        with planners(batch.device, vertices, workers, executor) as ready:
+        with planners(batch.device, vertices, workers, executor, main=bool(own_terms)) as ready:
+            ready.check_sent("terms", own_terms)
             share = min(-(-count // ready.workers), _SHARE, most)
             pieces = [designs[k : k + share] for k in range(0, count, share)]
             work = partial(solve_batch, batch, minimise=minimise_elsewhere)
@@ -76,6 +83,7 @@ def planners(
     executor: Executor | None = None,
     *,
     enough: float = 0.5,
+    main: bool = False,
 ) -> Iterator[DeviceExecutor]:
     """Open an executor for which this process minimises on a device.
 
@@ -91,8 +99,10 @@ def planners(
         Processes to use instead.
     enough : float
         As for :class:`DeviceExecutor`.
+    main : bool
+        As for :class:`ProcessExecutor`, where there is no `executor`.
     """
-    processes = executor or ProcessExecutor(2 * (workers or processors()))
+    processes = executor or ProcessExecutor(2 * (workers or processors()), main=main)
     if not isinstance(processes, ProcessExecutor):
         raise OptionError("a graphics processor needs worker processes: give a ProcessExecutor")
     together, most = partial(device.solve, device=where), max(_MOST // vertices, 1)

@@ -13,6 +13,7 @@ from gso.executors import Executor
 from gso.executors.base import check_workers
 from gso.result import Result
 from gso.tasks.base import Options
+from gso.tasks.request import OwnTerms
 from gso.tno.batched import device as devices
 from gso.tno.batched.batches import check_batch
 from gso.tno.batched.many import solve_all
@@ -28,6 +29,7 @@ def optimize_batch(
     device: str = "cpu",
     workers: int | None = None,
     executor: Executor | None = None,
+    terms: Sequence[OwnTerms] = (),
     verdict: bool = False,
 ) -> list[Result]:
     """Make many grids of one size developable, or flatten them, in batches on PyTorch tensors.
@@ -62,6 +64,10 @@ def optimize_batch(
     executor : Executor, optional
         Works instead, and stays open for other calls: :class:`gso.executors.ProcessExecutor`. With
         a graphics processor it needs two processes for each that works at a time.
+    terms : sequence of callable
+        As for :func:`gso.tno.optimize`. Surfaces are solved one by one where the residual of a
+        term is not a function at the top level of a module. Workers need all functions there; with
+        terms there are none unless `workers` or `executor` is given.
     verdict : bool
         Judge the results, and flatten developable ones to measure their strain. This is done
         surface by surface on the processor.
@@ -78,7 +84,8 @@ def optimize_batch(
     MeshError
         The designs are not grids of one size, or one cannot be used; the message has its index.
     OptionError
-        An option is unknown, has no batched solve, or the device does not exist.
+        An option is unknown, has no batched solve, or the device does not exist; or terms cannot
+        be sent to workers.
 
     Examples
     --------
@@ -92,7 +99,7 @@ def optimize_batch(
     check_workers(workers)
     designs = _designs(points)
     devices.check_device(device)
-    batch = check_batch(task, formulation, options, device, verdict)
+    batch = check_batch(task, formulation, options, device, verdict, terms)
     out: list[Result] = []
     for index, found in enumerate(solve_all(batch, list(designs), workers, executor)):
         if isinstance(found, GSOError):

@@ -98,7 +98,19 @@ def _describe(stage: Stage) -> Structure:
 
 
 def _name(function: Callable[..., object] | None) -> str:
-    return "" if function is None else f"{function.__module__}.{function.__qualname__}"
+    """Return the full name of a function at the top level of a module.
+
+    Raises
+    ------
+    Unbatchable
+        It is no such function: those of two surfaces may differ in spite of the same name.
+    """
+    if function is None:
+        return ""
+    name = getattr(function, "__qualname__", "<")
+    if "<" in name:
+        raise Unbatchable
+    return f"{function.__module__}.{name}"
 
 
 def solve(
