@@ -7,7 +7,7 @@ millimetres (:func:`fitted`) and become parts (:func:`parts_from`), and parts ar
 """
 
 from gso.pattern import Bend
-from gso.workshop.assembly_view import assembly
+from gso.workshop.assembly_view import Places
 from gso.workshop.congruent import origins, united
 from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
@@ -33,9 +33,9 @@ __all__ = [
     "Notch",
     "Panel",
     "Part",
+    "Places",
     "TabSeam",
     "Thickness",
-    "assembly",
     "designs_of",
     "fitted",
     "guide_lines",

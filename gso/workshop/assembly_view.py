@@ -5,28 +5,243 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from xml.etree.ElementTree import SubElement, tostring
 
 import numpy as np
 
 from gso import geometry
+from gso.geometry.polygon import arc_lengths
 from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.mesh.view import GRAZING, View, lit, pale_colours
-from gso.typing import Array
-from gso.workshop.panels import Made
+from gso.typing import Array, Ints
+from gso.workshop.panels import Made, Mating
 
-#: Size of a picture, its margin and the height of its texts, in pixels; pixels of the image of
-#: the faces per pixel; points of a line at which it is looked for behind others, and their
-#: distance from faces.
-_SIZE, _MARGIN, _TALL, _FINE, _POINTS, _NEAR = 470, 12, 14, 2, 9, 3.0
+#: Size of a picture and the height of its capital letters, in pixels.
+SIZE, TALL = 470, 10.0
+#: Margin in pixels; pixels of the image of the faces per pixel; points of a line at which it is
+#: looked for behind others, and their distance from faces.
+_MARGIN, _FINE, _POINTS, _NEAR = 12, 2, 9, 3.0
 #: Lowest brightness.
 _DARK = 0.45
 
 
-def assembly(made: Made, link: Callable[[str], str]) -> list[str]:
-    """Draw the panels of a design from two opposite sides.
+@dataclass(frozen=True, eq=False)
+class Name:
+    """A text of a picture: what a panel or a seam is called.
+
+    Attributes
+    ----------
+    text : str
+    at : ndarray, (2,)
+        The middle of its base line.
+    title : str
+        The whole name.
+    """
+
+    text: str
+    at: Array
+    title: str
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture of panels in their places, in pixels with y up.
+
+    Attributes
+    ----------
+    size : (float, float)
+        Width and height.
+    image : ndarray of uint8, (rows, columns, 3)
+        The faces; the first row is the upper one.
+    lines : dict of ndarray (k, 2, 2)
+        Lines that are seen, by their kind: "bend", "rim", "seam".
+    names : tuple of Name
+    """
+
+    size: tuple[float, float]
+    image: np.ndarray
+    lines: dict[str, Array]
+    names: tuple[Name, ...] = ()
+
+    def svg(self, link: Callable[[str], str] = lambda title: "", name: str = "") -> str:
+        """Return it as an SVG element.
+
+        `link` gives the addresses of names, empty for none; `name` is the identifier of the group
+        of all but the names, which other pictures may repeat.
+        """
+        page = SVGPage(np.zeros(2), np.array(self.size), digits=4)
+        width, height = (f"{side:.5g}" for side in self.size)
+        for unused in ("width", "height"):
+            del page.root.attrib[unused]
+        page.root.attrib |= {"class": "picture", "style": f"--w:{self.size[0]:.0f}"}
+        source = f"data:image/png;base64,{base64.b64encode(self.png()).decode()}"
+        faces = SubElement(page.root, "g", {"id": name} if name else {})
+        SubElement(faces, "image", {"href": source, "width": width, "height": height})
+        for kind, lines in self.lines.items():
+            page.path(faces, lines, kind=kind)
+        for own in self.names:
+            address = link(own.title)
+            target = SubElement(page.root, "a", {"href": address} if address else {})
+            SubElement(target, "title").text = own.title
+            page.text(target, own.text, own.at, TALL)
+        return tostring(page.root, "unicode")
+
+    def png(self) -> bytes:
+        """Return the image of the faces as a PNG file."""
+        return _png(self.image)
+
+
+class Stage:
+    """The panels of a design in one view, put on one after another.
+
+    Parameters
+    ----------
+    made : Made
+    view : View
+    size : float
+        The larger side of its pictures, without margins, in pixels.
+    """
+
+    def __init__(self, made: Made, view: View, size: float = SIZE):
+        self._made = made
+        meshes = [panel.surface for panel in made.panels]
+        points = [view.project(mesh.vertices) for mesh in meshes]
+        every = np.concatenate(points)
+        low, extent = every[:, :2].min(axis=0), np.ptp(every[:, :2], axis=0)
+        self._scale = size / float(extent.max())
+        self._view, self._low = view, low
+        wide, high = (self._scale * extent + 2 * _MARGIN).tolist()
+        self.size = wide, high
+        # Pixels of the picture, y up; the image has its first row above.
+        self._placed = [self._pixels(p) for p in points]
+        turned = [self._turned(p) for p in self._placed]
+        self._turned_points = turned
+        self._corners = [p[m.triangles] for p, m in zip(turned, meshes, strict=True)]
+        self._first = np.cumsum([0, *(len(own) for own in self._corners)])
+        self._owner = np.repeat(np.arange(len(meshes)), [len(own) for own in self._corners])
+        shape = (int(np.ceil(_FINE * high)), int(np.ceil(_FINE * wide)))
+        self._triangle = np.full(shape, -1)
+        self._depth = np.full(shape, -np.inf)
+        self._shown: list[int] = []
+
+    def _pixels(self, points: Array) -> Array:
+        placed: Array = self._scale * (points - [*self._low, 0.0]) + [_MARGIN, _MARGIN, 0.0]
+        return placed
+
+    def _turned(self, placed: Array) -> Array:
+        turned: Array = _FINE * (placed * [1.0, -1.0, 1.0] + [0.0, self.size[1], 0.0])
+        return turned
+
+    def add(self, panels: Iterable[int]) -> None:
+        """Put panels on, by their numbers."""
+        panels = list(panels)
+        corners = np.concatenate([np.empty((0, 3, 3)), *(self._corners[k] for k in panels)])
+        number = np.concatenate(
+            [np.empty(0, np.int64), *(np.arange(*self._first[k : k + 2]) for k in panels)]
+        )
+        if not len(corners):
+            return
+        triangle, depth = geometry.nearest_triangles(corners, self._depth.shape)
+        nearer = depth > self._depth
+        self._depth[nearer] = depth[nearer]
+        self._triangle[nearer] = number[triangle[nearer]]
+        self._shown += panels
+
+    @property
+    def owner(self) -> Ints:
+        """The panel that is seen in each pixel of the image, -1 for none."""
+        return np.where(self._triangle >= 0, self._owner[self._triangle], -1)
+
+    def picture(
+        self,
+        colours: Array,
+        *,
+        named: Sequence[int] | None = None,
+        bends: bool = True,
+        seams: Sequence[Mating] = (),
+    ) -> Picture:
+        """Draw what was put on.
+
+        Parameters
+        ----------
+        colours : ndarray, (p, 3)
+            Of all panels, 0 to 1.
+        named : sequence of int, optional
+            Panels whose names are drawn where they are seen; by default all.
+        bends : bool
+            Whether bend lines are drawn.
+        seams : sequence of Mating
+            Seams that are drawn in front of everything, with their numbers.
+        """
+        shown = self._triangle >= 0
+        image = np.full((*self._depth.shape, 3), 255, np.uint8)
+        seen = self._triangle[shown]
+        tones = np.zeros((len(self._owner), 3), np.uint8)
+        used = np.unique(seen)
+        corners = np.concatenate(self._corners)[used]
+        tones[used] = _tones(corners, colours[self._owner[used]])
+        image[shown] = tones[seen]
+        panels = self._made.panels
+        lines = {}
+        for kind in ("bend", "rim") if bends else ("rim",):
+            edges = [panels[k].bends if kind == "bend" else panels[k].rim for k in self._shown]
+            lines[kind] = self._seen(edges)
+        names = []
+        wanted = set(self._shown if named is None else named)
+        for number, middle in geometry.roomiest_pixels(self.owner).items():
+            if number in wanted:
+                column, row = middle / _FINE
+                at = np.array([column, self.size[1] - row - 0.5 * TALL])
+                title = panels[number].name
+                names.append(Name(short(title, self._made.name), at, title))
+        if seams:
+            drawn = [self._seam(seam) for seam in seams]
+            lines["seam"] = np.concatenate(
+                [np.stack([line[:-1], line[1:]], axis=1) for line in drawn]
+            )
+            for seam, line in zip(seams, drawn, strict=True):
+                names.append(Name(str(seam.number), _middle(line), f"seam {seam.number}"))
+        return Picture(self.size, image, lines, tuple(names))
+
+    def outline(self, panel: int) -> list[Array]:
+        """Return the loops (k, 2) of a panel's boundary, whether they are seen or not."""
+        return [self._placed[panel][loop, :2] for loop in self._made.panels[panel].loops]
+
+    def _seam(self, seam: Mating) -> Array:
+        points = seam.one.on(self._made.panels[seam.one.panel].surface.vertices)
+        return self._pixels(self._view.project(points))[:, :2]
+
+    def _seen(self, edges: Sequence[Ints]) -> Array:
+        """Return what is seen of edges of each panel that was put on, (k, 2, 2)."""
+        drawn = [
+            _seen_parts(self._placed[k][ends], self._turned_points[k][ends], self._depth)
+            for k, ends in zip(self._shown, edges, strict=True)
+        ]
+        return np.concatenate([np.empty((0, 2, 2)), *drawn])
+
+
+def here(picture: Picture, name: str, loops: Sequence[Array]) -> str:
+    """Draw the place of a panel, by its outline (k, 2) each, on a picture with an identifier."""
+    page = SVGPage(np.zeros(2), np.array(picture.size), digits=4)
+    for unused in ("width", "height"):
+        del page.root.attrib[unused]
+    page.root.set("class", "place")
+    SubElement(page.root, "use", {"href": f"#{name}"})
+    page.path(page.root, loops, closed=True, kind="here")
+    return tostring(page.root, "unicode")
+
+
+def sides(made: Made) -> tuple[View, View]:
+    """Return the views of a design's panels from the front and from behind."""
+    front = View.of(_joined([panel.surface for panel in made.panels]))
+    return front, front.behind
+
+
+class Places:
+    """Pictures of a design's panels in their places, from two opposite sides.
 
     Panels have colours of their own, and their names where they are seen. Thin lines are bends,
     thick ones are outlines.
@@ -34,16 +249,31 @@ def assembly(made: Made, link: Callable[[str], str]) -> list[str]:
     Parameters
     ----------
     made : Made
-    link : callable
-        Gives the address of what is shown when a panel's name is clicked; empty for none.
 
-    Returns
-    -------
-    list of str
-        SVG elements.
+    Attributes
+    ----------
+    pictures : list of Picture
+        From the front, and from behind.
     """
-    front = View.of(_joined([panel.surface for panel in made.panels]))
-    return [_drawn(view, made, link) for view in (front, front.behind)]
+
+    def __init__(self, made: Made):
+        self._stages = [Stage(made, view) for view in sides(made)]
+        count = len(made.panels)
+        seen = []
+        self.pictures = []
+        for stage in self._stages:
+            stage.add(range(count))
+            self.pictures.append(stage.picture(pale_colours(count)))
+            seen.append(np.bincount(stage.owner.ravel() + 1, minlength=count + 1)[1:])
+        self._best = np.argmax(seen, axis=0)
+
+    def side(self, panel: int) -> int:
+        """Return the number of the picture in which most of a panel is seen."""
+        return int(self._best[panel])
+
+    def outline(self, side: int, panel: int) -> list[Array]:
+        """Return the loops (k, 2) of a panel's boundary in a picture."""
+        return self._stages[side].outline(panel)
 
 
 def _joined(meshes: Sequence[Mesh]) -> Mesh:
@@ -53,51 +283,16 @@ def _joined(meshes: Sequence[Mesh]) -> Mesh:
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
 
 
-def _drawn(view: View, made: Made, link: Callable[[str], str]) -> str:
-    """Draw the panels in a view: faces as an image, what is seen of lines, and names."""
-    meshes = [panel.surface for panel in made.panels]
-    points = [view.project(mesh.vertices) for mesh in meshes]
-    every = np.concatenate(points)
-    low, size = every[:, :2].min(axis=0), np.ptp(every[:, :2], axis=0)
-    scale = _SIZE / float(size.max())
-    high = scale * size + 2 * _MARGIN
-    # Pixels of the picture, y up; the image has its first row above.
-    placed = [scale * (p - [*low, 0.0]) + [_MARGIN, _MARGIN, 0.0] for p in points]
-    turned = [_FINE * (p * [1.0, -1.0, 1.0] + [0.0, high[1], 0.0]) for p in placed]
-    corners = np.concatenate([p[m.triangles] for p, m in zip(turned, meshes, strict=True)])
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.triangles) for mesh in meshes])
-    wide, tall = (int(np.ceil(_FINE * side)) for side in high)
-    triangle, depth = geometry.nearest_triangles(corners, (tall, wide))
-    image = np.full((tall, wide, 3), 255, np.uint8)
-    shown = triangle >= 0
-    image[shown] = _tones(corners, pale_colours(len(meshes))[owner])[triangle[shown]]
-
-    page = SVGPage(np.zeros(2), high, digits=5)
-    width, height = (f"{side:.5g}" for side in high)
-    page.root.attrib |= {"width": width, "height": height}
-    source = f"data:image/png;base64,{base64.b64encode(_png(image)).decode()}"
-    SubElement(page.root, "image", {"href": source, "width": width, "height": height})
-    bends, rims = ([getattr(panel, name) for panel in made.panels] for name in ("bends", "rim"))
-    for kind, edges in (("bend", bends), ("rim", rims)):
-        drawn = [
-            _seen_parts(own[ends], turn[ends], depth)
-            for ends, own, turn in zip(edges, placed, turned, strict=True)
-        ]
-        page.path(page.root, np.concatenate(drawn), kind=kind)
-    for number, middle in geometry.roomiest_pixels(np.where(shown, owner[triangle], -1)).items():
-        name, (column, row) = made.panels[number].name, middle / _FINE
-        address = link(name)
-        target = SubElement(page.root, "a", {"href": address} if address else {})
-        SubElement(target, "title").text = name
-        at = np.array([column, high[1] - row - 0.36 * _TALL])
-        page.text(target, _short(name, made.name), at, 0.72 * _TALL)
-    return tostring(page.root, "unicode")
+def _middle(line: Array) -> Array:
+    """Return the point half-way along a line (k, 2)."""
+    along = arc_lengths(line)
+    return np.array([np.interp(0.5 * along[-1], along, x) for x in line.T])
 
 
-def _short(name: str, design: str) -> str:
+def short(name: str, design: str) -> str:
     """Return a name without the design's.
 
-    >>> _short("roof-A-1", "roof"), _short("roof", "roof")
+    >>> short("roof-A-1", "roof"), short("roof", "roof")
     ('A-1', 'roof')
     """
     return name.removeprefix(f"{design}-") or name
@@ -136,5 +331,7 @@ def _png(image: np.ndarray) -> bytes:
     # Each row begins with the number of its filter, 0 for none.
     lines = np.pad(image.reshape(rows, -1), ((0, 0), (1, 0))).tobytes()
     head = struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0)
-    parts = [(b"IHDR", head), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
+    # White is transparent: what has no face shows the page.
+    white = (b"tRNS", b"\x00\xff" * 3)
+    parts = [(b"IHDR", head), white, (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,8 @@ from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER, SOLIDS
 from gso.workshop.page import page
-from gso.workshop.panels import Made
+from gso.workshop.page_data import Shown
+from gso.workshop.page_views import Views
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
@@ -69,7 +70,7 @@ def written(
     place: Path,
     parts: Sequence[Part],
     sheets: Sequence[Drawing],
-    found: Collection[Made],
+    shown: Sequence[Shown],
     certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
@@ -91,8 +92,8 @@ def written(
             write(drawing, f"sheets/sheet-{number}.{suffix}", suffix)
     if drawings.paper is not None and parts:
         write(beside(parts), PAPER, "pdf")
-    for one in found:
-        for panel in one.panels:
+    for one in shown:
+        for panel in one.made.panels:
             name = f"surfaces/{panel.name}.obj"
             (place / name).parent.mkdir(exist_ok=True)
             io.write(panel.surface, place / name)
@@ -100,7 +101,8 @@ def written(
     if solids:
         io.save_solids(solids, place / SOLIDS)
         files.append(SOLIDS)
-    write_bytes(place / PAGE, page(certificate, parts, sheets, found).encode())
+    views = Views(shown, certificate)
+    write_bytes(place / PAGE, page(certificate, parts, sheets, views).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)

@@ -1,0 +1,108 @@
+"""Where parts are: their mates, their places in their designs, and the order of joining."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from html import escape
+
+from gso.typing import Json
+from gso.workshop.assembly_view import Picture, Places, here
+from gso.workshop.joining import StepPicture, in_words, pictures
+from gso.workshop.page_data import Shown, mates
+from gso.workshop.page_text import drawn_as
+
+#: Number of designs that are pictured.
+_PICTURED = 12
+_SIDES = ("from the front; thin lines are bends", "from behind")
+
+
+class Views:
+    """Pictures and seams of the panels that parts are drawn of.
+
+    Parameters
+    ----------
+    shown : sequence of Shown
+    certificate : dict
+        Whose records say which panels are the same part.
+    """
+
+    def __init__(self, shown: Sequence[Shown], certificate: Json):
+        self.shown = shown
+        same = drawn_as(certificate)
+        self._at: dict[str, list[tuple[int, int]]] = {}
+        for design, one in enumerate(shown):
+            for k, panel in enumerate(one.made.panels):
+                self._at.setdefault(same[panel.name], []).append((design, k))
+
+    @cached_property
+    def places(self) -> list[Places]:
+        """Pictures of the first designs."""
+        return [Places(one.made) for one in self.shown[:_PICTURED]]
+
+    @cached_property
+    def steps(self) -> list[list[StepPicture]]:
+        """Pictures of the order of joining, of designs of several panels."""
+        return [pictures(one.made, one.steps) for one in self.shown[:_PICTURED]]
+
+    def mates(self, part: str) -> tuple[list[int], list[str]]:
+        """Return the numbers of the seams of a part, and the names of the panels it is joined to."""
+        seams: set[int] = set()
+        others: list[str] = []
+        for design, panel in self._at[part]:
+            made = self.shown[design].made
+            for seam, other in mates(made, panel):
+                seams.add(seam.number)
+                if other != panel:
+                    others.append(made.panels[other].name)
+        return sorted(seams), list(dict.fromkeys(others))
+
+    def place(self, part: str) -> tuple[Picture, str, list] | None:
+        """Return the picture of a part's place, its identifier, and the outlines of its panels.
+
+        None if its design is not pictured.
+        """
+        design, first = self._at[part][0]
+        if design >= len(self.places):
+            return None
+        places = self.places[design]
+        side = places.side(first)
+        own = [k for number, k in self._at[part] if number == design]
+        loops = [loop for k in own for loop in places.outline(side, k)]
+        return places.pictures[side], f"view-{design}-{side}", loops
+
+
+def place_picture(views: Views, part: str) -> str:
+    """Return the picture of a part's place as SVG; empty if its design is not pictured."""
+    found = views.place(part)
+    return "" if found is None else here(*found)
+
+
+def whole_pictures(views: Views, address: Callable[[str], str]) -> list[str]:
+    """Return the pictures of designs from both sides, with the names of their parts."""
+    lines = []
+    for design, places in enumerate(views.places):
+        name = escape(views.shown[design].made.name)
+        lines.append(f'<h3>{name}: the parts in their places</h3><div class="pictures">')
+        for side, picture in enumerate(places.pictures):
+            drawn = picture.svg(address, f"view-{design}-{side}")
+            lines.append(f"<figure>{drawn}<figcaption>{_SIDES[side]}</figcaption></figure>")
+        lines.append("</div>")
+    return lines
+
+
+def assembly_sheet(views: Views, address: Callable[[str], str]) -> list[str]:
+    """Return the pictures of the order in which the parts of each design are joined."""
+    lines = []
+    for one, own in zip(views.shown, views.steps, strict=False):
+        if not own:
+            continue
+        lines.append(f'<h3>{escape(one.made.name)}: order of joining</h3><ol class="steps">')
+        for shot in own:
+            said = "".join(
+                f'<li value="{shot.first + k}">{escape(in_words(step, one.made))}</li>'
+                for k, step in enumerate(shot.steps)
+            )
+            lines.append(f"<li>{shot.picture.svg(address)}<ol>{said}</ol></li>")
+        lines.append("</ol>")
+    return lines
