@@ -39,11 +39,13 @@ class Name:
         The middle of its base line.
     title : str
         The whole name.
+    kind : {"panel", "seam"}
     """
 
     text: str
     at: Array
     title: str
+    kind: str = "panel"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,7 @@ class Picture:
         for own in self.names:
             address = link(own.title)
             target = SubElement(page.root, "a", {"href": address} if address else {})
+            target.set("class", f"{own.kind}-name")
             SubElement(target, "title").text = own.title
             page.text(target, own.text, own.at, TALL)
         return tostring(page.root, "unicode")
@@ -203,7 +206,7 @@ class Stage:
                 [np.stack([line[:-1], line[1:]], axis=1) for line in drawn]
             )
             for seam, line in zip(seams, drawn, strict=True):
-                names.append(Name(str(seam.number), _middle(line), f"seam {seam.number}"))
+                names.append(Name(str(seam.number), _middle(line), f"seam {seam.number}", "seam"))
         return Picture(self.size, image, lines, tuple(names))
 
     def outline(self, panel: int) -> list[Array]:

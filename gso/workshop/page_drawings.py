@@ -11,7 +11,7 @@ from gso.geometry.rigid import closest_motion
 from gso.io.svg_page import SVGPage
 from gso.typing import Array
 from gso.workshop.name_places import name_place
-from gso.workshop.part import Drawing, Part
+from gso.workshop.part import Drawing, Label, Part
 from gso.workshop.writers import strokes
 
 #: Margin, least length of notches, and height of names, as shares of a drawing's larger side.
@@ -112,7 +112,7 @@ def _closed(line: strokes.Line) -> Array:
 def _notches(page: SVGPage, lines: Element, part: Part, size: float) -> None:
     """Draw notches, and the text of each mark beside one of its notches."""
     marks: dict[str, Element] = {}
-    texts = {}
+    texts: dict[str, Label] = {}
     for label in strokes.texts(part):
         texts.setdefault(label.text, label)
     for notch in part.notches:

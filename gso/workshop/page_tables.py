@@ -51,7 +51,7 @@ def parts_table(
 def seams_table(views: Views, address: Callable[[str], str]) -> str:
     """Return the table of seams: which parts each joins; empty without seams."""
     heads = ("seam", "design", "part", "other part", "length mm", "angle °", "difference mm")
-    rows = []
+    rows: list[tuple[str, list[str]]] = []
     for one in views.shown:
         panels = one.made.panels
         for seam in one.made.matings:

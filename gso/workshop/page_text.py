@@ -53,11 +53,9 @@ def number(value: float | None) -> str:
 
 def small_mm(value: float | None) -> str:
     """Return a small length in millimetres, such as a distance, with three digits."""
-    return (
-        "-"
-        if value is None
-        else f'<span data-mm="{value:.7g}" data-digits="3">{number(value)}</span>'
-    )
+    if value is None:
+        return "-"
+    return f'<span data-mm="{value:.7g}" data-digits="3">{number(value)}</span>'
 
 
 def head(words: str) -> str:
@@ -90,8 +88,11 @@ def drawn_as(certificate: Json) -> dict[str, str]:
 
 
 def addresses(certificate: Json, parts: Sequence[Part]) -> Callable[[str], str]:
-    """Return a function that gives the place on the page of the part that a panel is made as."""
+    """Return a function that gives the place on the page of the part that a panel is made as.
+
+    It is empty for what is no panel.
+    """
     names = [part.name for part in parts]
     own = dict(zip(names, strokes.identifiers(parts), strict=True))
-    same = drawn_as(certificate)
-    return lambda name: f"#part-{own[same.get(name, name)]}"
+    every = {name: f"#part-{own[same]}" for name, same in drawn_as(certificate).items()}
+    return lambda name: every.get(name, "")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from html import escape
 
-from gso.typing import Json
+from gso.typing import Array, Json
 from gso.workshop.assembly_view import Picture, Places, here
 from gso.workshop.joining import StepPicture, in_words, pictures
 from gso.workshop.page_data import Shown, mates
@@ -46,7 +46,7 @@ class Views:
         return [pictures(one.made, one.steps) for one in self.shown[:_PICTURED]]
 
     def mates(self, part: str) -> tuple[list[int], list[str]]:
-        """Return the numbers of the seams of a part, and the names of the panels it is joined to."""
+        """Return the numbers of a part's seams, and the names of the panels it is joined to."""
         seams: set[int] = set()
         others: list[str] = []
         for design, panel in self._at[part]:
@@ -57,7 +57,7 @@ class Views:
                     others.append(made.panels[other].name)
         return sorted(seams), list(dict.fromkeys(others))
 
-    def place(self, part: str) -> tuple[Picture, str, list] | None:
+    def place(self, part: str) -> tuple[Picture, str, list[Array]] | None:
         """Return the picture of a part's place, its identifier, and the outlines of its panels.
 
         None if its design is not pictured.
