@@ -17,7 +17,7 @@ from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.mesh.view import GRAZING, View, lit, pale_colours
 from gso.typing import Array, Ints
-from gso.workshop.panels import Made, Mating
+from gso.workshop.panels import Made, Mating, Panel
 
 #: Size of a picture and the height of its capital letters, in pixels.
 SIZE, TALL = 470, 10.0
@@ -237,9 +237,9 @@ def here(picture: Picture, name: str, loops: Sequence[Array]) -> str:
     return tostring(page.root, "unicode")
 
 
-def sides(made: Made) -> tuple[View, View]:
-    """Return the views of a design's panels from the front and from behind."""
-    front = View.of(_joined([panel.surface for panel in made.panels]))
+def sides(panels: Sequence[Panel]) -> tuple[View, View]:
+    """Return the views of panels from the front and from behind."""
+    front = View.of(_joined([panel.surface for panel in panels]))
     return front, front.behind
 
 
@@ -260,7 +260,7 @@ class Places:
     """
 
     def __init__(self, made: Made):
-        self._stages = [Stage(made, view) for view in sides(made)]
+        self._stages = [Stage(made, view) for view in sides(made.panels)]
         count = len(made.panels)
         seen = []
         self.pictures = []

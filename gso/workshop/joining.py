@@ -123,11 +123,12 @@ def pictures(made: Made, steps: Sequence[Step], most: int = PICTURES) -> list[St
         Largest number of pictures: where there are more steps, each shows several.
     """
     each = -(-len(steps) // most)
-    stages = [Stage(made, view, _SIZE) for view in sides(made)]
+    views = sides(made.panels)
+    stages = [Stage(made, view, _SIZE) for view in views]
     for stage in stages:
         stage.add(range(len(made.panels)))
     seen = [len(np.unique(stage.owner)) for stage in stages]
-    stage = Stage(made, sides(made)[int(np.argmax(seen))], _SIZE)
+    stage = Stage(made, views[int(np.argmax(seen))], _SIZE)
     seams = {seam.number: seam for seam in made.matings}
     out = []
     for first in range(0, len(steps), each):

@@ -20,7 +20,7 @@ from gso.mesh import Mesh
 from gso.mesh.view import pale_colours
 from gso.pattern import Bend
 from gso.typing import Array, Json
-from gso.workshop.assembly_view import short
+from gso.workshop.assembly_view import short, sides
 from gso.workshop.joining import Step, order
 from gso.workshop.page_arrays import Arrays
 from gso.workshop.panels import Made, Mating, Panel
@@ -85,7 +85,8 @@ def page_data(shown: Sequence[Shown], parts: Sequence[Part], certificate: Json) 
         ``mesh`` and ``motions``; ``panels`` their design, their part, ``points`` in place,
         ``flat``, ``triangles``, edges of ``rim`` and ``bends``, and ``values`` at the points;
         ``seams`` the two panels, lengths and ``line``; ``parts`` what the certificate says;
-        ``steps`` the order of joining.
+        ``steps`` the order of joining; ``view`` the axes of the view from the front: right, up,
+        towards the viewer are its columns.
     """
     arrays = Arrays()
     records = {one["name"]: one for one in certificate["designs"]}
@@ -118,6 +119,9 @@ def page_data(shown: Sequence[Shown], parts: Sequence[Part], certificate: Json) 
             {"panel": first + step.panel, "design": k, "seams": [*step.closed, *step.seams]}
             for step in one.steps
         ]
+    if out["panels"]:
+        every = [panel for one in shown for panel in one.made.panels]
+        out["view"] = sides(every)[0].axes.tolist()
     out["parts"] = [
         entry | {"bends": [_bend(bend) for bend in part.bends]}
         for entry, part in zip(entries, parts, strict=True)
