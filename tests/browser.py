@@ -61,7 +61,9 @@ class Browser:
             time.sleep(0.05)
         port = int(said.read_text().split()[0])
         with socket.create_connection(("127.0.0.1", port)) as plain:
-            plain.sendall(b"GET /json/list HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            plain.sendall(
+                b"GET /json/list HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+            )
             body = b""
             while b"\r\n\r\n" not in body or not body.rstrip().endswith(b"]"):
                 body += plain.recv(65536)

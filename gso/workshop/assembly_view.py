@@ -16,7 +16,7 @@ from gso.geometry.polygon import arc_lengths
 from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.mesh.view import GRAZING, View, lit, pale_colours
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 from gso.workshop.panels import Made, Mating, Panel
 
 #: Size of a picture and the height of its capital letters, in pixels.
@@ -26,6 +26,10 @@ SIZE, TALL = 470, 10.0
 _MARGIN, _FINE, _POINTS, _NEAR = 12, 2, 9, 3.0
 #: Lowest brightness.
 _DARK = 0.45
+#: Degrees of brightness of pictures with few of them.
+_DEGREES = 24
+#: Colour of outlines in the image of the faces.
+_EDGE = (110, 110, 108)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +63,7 @@ class Picture:
     image : ndarray of uint8, (rows, columns, 3)
         The faces; the first row is the upper one.
     lines : dict of ndarray (k, 2, 2)
-        Lines that are seen, by their kind: "bend", "rim", "seam".
+        Lines that are seen, by their kind: "bends", "rim", "joined" (seams).
     names : tuple of Name
     """
 
@@ -162,8 +166,7 @@ class Stage:
         self,
         colours: Array,
         *,
-        named: Sequence[int] | None = None,
-        bends: bool = True,
+        new: Sequence[int] | None = None,
         seams: Sequence[Mating] = (),
     ) -> Picture:
         """Draw what was put on.
@@ -172,10 +175,9 @@ class Stage:
         ----------
         colours : ndarray, (p, 3)
             Of all panels, 0 to 1.
-        named : sequence of int, optional
-            Panels whose names are drawn where they are seen; by default all.
-        bends : bool
-            Whether bend lines are drawn.
+        new : sequence of int, optional
+            Panels whose names and lines are drawn; others have their outlines in the image of
+            the faces only. By default all.
         seams : sequence of Mating
             Seams that are drawn in front of everything, with their numbers.
         """
@@ -185,49 +187,61 @@ class Stage:
         tones = np.zeros((len(self._owner), 3), np.uint8)
         used = np.unique(seen)
         corners = np.concatenate(self._corners)[used]
-        tones[used] = _tones(corners, colours[self._owner[used]])
+        tones[used] = _tones(corners, colours[self._owner[used]], new is None)
         image[shown] = tones[seen]
-        panels = self._made.panels
-        lines = {}
-        for kind in ("bend", "rim") if bends else ("rim",):
-            edges = [panels[k].bends if kind == "bend" else panels[k].rim for k in self._shown]
-            lines[kind] = self._seen(edges)
+        panels, owner = self._made.panels, self.owner
+        drawn_panels = self._shown if new is None else list(new)
+        if new is not None:
+            image[_borders(owner)] = _EDGE
+        lines = {
+            kind: self._seen(drawn_panels, [getattr(panels[k], kind) for k in drawn_panels])
+            for kind in ("bends", "rim")
+        }
         names = []
-        wanted = set(self._shown if named is None else named)
-        for number, middle in geometry.roomiest_pixels(self.owner).items():
-            if number in wanted:
-                column, row = middle / _FINE
-                at = np.array([column, self.size[1] - row - 0.5 * TALL])
-                title = panels[number].name
-                names.append(Name(short(title, self._made.name), at, title))
+        for number, middle in _roomiest(owner, drawn_panels).items():
+            column, row = middle / _FINE
+            at = np.array([column, self.size[1] - row - 0.5 * TALL])
+            title = panels[number].name
+            names.append(Name(short(title, self._made.name), at, title))
         if seams:
             drawn = [self._seam(seam) for seam in seams]
-            lines["seam"] = np.concatenate(
+            lines["joined"] = np.concatenate(
                 [np.stack([line[:-1], line[1:]], axis=1) for line in drawn]
             )
             for seam, line in zip(seams, drawn, strict=True):
                 names.append(Name(str(seam.number), _middle(line), f"seam {seam.number}", "seam"))
         return Picture(self.size, image, lines, tuple(names))
 
-    def outline(self, panel: int) -> list[Array]:
-        """Return the loops (k, 2) of a panel's boundary, whether they are seen or not."""
-        return [self._placed[panel][loop, :2] for loop in self._made.panels[panel].loops]
+    def shadow(self, panel: int) -> list[Array]:
+        """Return the outlines (k, 2) of what a panel covers, whether it is seen or not."""
+        import shapely
+
+        own = self._made.panels[panel]
+        corners = self._placed[panel][own.surface.triangles, :2]
+        if not np.ptp(np.sign(_areas(corners))):
+            # Nothing is folded over: the outline is that of the panel.
+            return [self._placed[panel][loop, :2] for loop in own.loops]
+        # Rounding to a tenth of a pixel closes gaps between triangles.
+        whole = shapely.union_all(shapely.polygons(corners), grid_size=0.1)
+        shapes = shapely.get_parts(shapely.simplify(whole, 0.3))
+        rings = shapely.get_rings(shapes[shapely.get_type_id(shapes) == 3])
+        return [shapely.get_coordinates(ring)[:-1] for ring in rings]
 
     def _seam(self, seam: Mating) -> Array:
         points = seam.one.on(self._made.panels[seam.one.panel].surface.vertices)
         return self._pixels(self._view.project(points))[:, :2]
 
-    def _seen(self, edges: Sequence[Ints]) -> Array:
-        """Return what is seen of edges of each panel that was put on, (k, 2, 2)."""
+    def _seen(self, panels: Sequence[int], edges: Sequence[Ints]) -> Array:
+        """Return what is seen of edges of each panel, (k, 2, 2)."""
         drawn = [
             _seen_parts(self._placed[k][ends], self._turned_points[k][ends], self._depth)
-            for k, ends in zip(self._shown, edges, strict=True)
+            for k, ends in zip(panels, edges, strict=True)
         ]
         return np.concatenate([np.empty((0, 2, 2)), *drawn])
 
 
 def here(picture: Picture, name: str, loops: Sequence[Array]) -> str:
-    """Draw the place of a panel, by its outline (k, 2) each, on a picture with an identifier."""
+    """Draw the place of a panel, by outlines (k, 2), on a picture with an identifier."""
     page = SVGPage(np.zeros(2), np.array(picture.size), digits=4)
     for unused in ("width", "height"):
         del page.root.attrib[unused]
@@ -274,9 +288,9 @@ class Places:
         """Return the number of the picture in which most of a panel is seen."""
         return int(self._best[panel])
 
-    def outline(self, side: int, panel: int) -> list[Array]:
-        """Return the loops (k, 2) of a panel's boundary in a picture."""
-        return self._stages[side].outline(panel)
+    def shadow(self, side: int, panel: int) -> list[Array]:
+        """Return the outlines (k, 2) of what a panel covers in a picture."""
+        return self._stages[side].shadow(panel)
 
 
 def _joined(meshes: Sequence[Mesh]) -> Mesh:
@@ -284,6 +298,31 @@ def _joined(meshes: Sequence[Mesh]) -> Mesh:
     first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     triangles = [mesh.triangles + k for mesh, k in zip(meshes, first, strict=False)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
+
+
+def _areas(corners: Array) -> Array:
+    """Return twice the signed areas of triangles (m, 3, 2)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _borders(owner: Ints) -> Flags:
+    """Tell which pixels have a neighbour of another panel, or of none, below or to the right."""
+    out = np.zeros(owner.shape, bool)
+    out[:-1] |= owner[:-1] != owner[1:]
+    out[:, :-1] |= owner[:, :-1] != owner[:, 1:]
+    return out
+
+
+def _roomiest(owner: Ints, panels: Sequence[int]) -> dict[int, Array]:
+    """Return the pixel (column, row) with most room for a name on each panel that is seen."""
+    own = np.where(np.isin(owner, panels), owner, -1)
+    rows, columns = (np.flatnonzero((own >= 0).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return {}
+    low = np.array([columns[0], rows[0]])
+    part = own[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return {k: middle + low for k, middle in geometry.roomiest_pixels(part).items()}
 
 
 def _middle(line: Array) -> Array:
@@ -315,11 +354,16 @@ def _seen_parts(lines: Array, turned: Array, depth: Array) -> Array:
     return np.concatenate([lines[whole][..., :2], steps[kept]])
 
 
-def _tones(corners: Array, colours: Array) -> np.ndarray:
-    """Return the colours of triangles, the same for both orientations, (m, 3)."""
+def _tones(corners: Array, colours: Array, fine: bool = True) -> np.ndarray:
+    """Return the colours of triangles, the same for both orientations, (m, 3).
+
+    With `fine` false there are few degrees of brightness.
+    """
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # Rows of the image count downwards.
-    bright = _DARK + (1.0 - _DARK) * lit(normal * [1.0, -1.0, 1.0], GRAZING)
+    light = lit(normal * [1.0, -1.0, 1.0], GRAZING)
+    light = light if fine else (_DEGREES * light).round() / _DEGREES
+    bright = _DARK + (1.0 - _DARK) * light
     return np.asarray(np.round(255.0 * colours * bright[:, None]).astype(np.uint8))
 
 
@@ -331,10 +375,18 @@ def _png(image: np.ndarray) -> bytes:
         return struct.pack(">I", len(data)) + name + data + check
 
     rows, columns = image.shape[:2]
+    code = image.astype(np.int64) @ [1 << 16, 1 << 8, 1]
+    colours, index = np.unique(code, return_inverse=True)
+    few = len(colours) <= 256
     # Each row begins with the number of its filter, 0 for none.
-    lines = np.pad(image.reshape(rows, -1), ((0, 0), (1, 0))).tobytes()
-    head = struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0)
-    # White is transparent: what has no face shows the page.
-    white = (b"tRNS", b"\x00\xff" * 3)
-    parts = [(b"IHDR", head), white, (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
+    pixels = index.reshape(rows, columns).astype(np.uint8) if few else image.reshape(rows, -1)
+    lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
+    parts = [(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 3 if few else 2, 0, 0, 0))]
+    # White, the last of the sorted colours, is transparent: what has no face shows the page.
+    if few:
+        parts.append((b"PLTE", b"".join(int(c).to_bytes(3, "big") for c in colours)))
+        parts.append((b"tRNS", b"\xff" * (len(colours) - 1) + b"\x00"))
+    else:
+        parts.append((b"tRNS", b"\x00\xff" * 3))
+    parts += [(b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)

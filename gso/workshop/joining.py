@@ -138,7 +138,7 @@ def pictures(made: Made, steps: Sequence[Step], most: int = PICTURES) -> list[St
         colours = np.full((len(made.panels), 3), _OLD)
         colours[new] = _NEW
         joined = [seams[n] for step in own for n in step.seams]
-        drawn = stage.picture(colours, named=new, bends=False, seams=joined)
+        drawn = stage.picture(colours, new=new, seams=joined)
         out.append(StepPicture(first + 1, own, drawn))
     return out
 

@@ -14,11 +14,11 @@ from gso.workshop.polygons import region, roomiest, without
 if TYPE_CHECKING:
     from shapely import Geometry
 
-#: Width of a letter over its height.
-_LETTER = 0.7
+#: Width of a letter over the height of a capital one, in wide fonts.
+_LETTER = 0.85
 #: Share of the wanted height down to which a name is written between bend lines; number of cells
-#: between bend lines that are tried, the largest first; steps down to the smallest height.
-_LEAST, _CELLS, _STEPS = 0.4, 6, (1.0, 0.8, 0.6, 0.4)
+#: between bend lines that are tried; steps down to the smallest height.
+_LEAST, _CELLS, _STEPS = 0.4, 8, (1.0, 0.7, 0.4)
 #: Half of the free width beside a bend line, over the height.
 _BESIDE = 0.15
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -55,35 +55,35 @@ def name_place(part: Part, text: str, height: float) -> tuple[Array, float, floa
     (True, 8.0, 0.0)
     """
     shape = region(part.outline, part.holes)
-    found = _between(part, shape, text, height) if part.bends else None
+    middle, room = roomiest(shape)
+    found = _between(part, shape, text, height, middle) if part.bends else None
     if found is not None:
         return found
-    middle, room = roomiest(shape)
     return middle, min(height, 2.0 * room / max(_LETTER * len(text), 1.0)), 0.0
 
 
 def _between(
-    part: Part, shape: Geometry, text: str, height: float
+    part: Part, shape: Geometry, text: str, height: float, near: Array
 ) -> tuple[Array, float, float] | None:
-    """Find a place between bend lines; None if there is none."""
+    """Find a place between bend lines, the nearest to a point; None if there is none."""
     import shapely
 
     lines = shapely.MultiLineString([bend.line for bend in part.bends])
     free = shapely.get_parts(without(shape, lines.buffer(_BESIDE * _LEAST * height)))
     free = free[shapely.get_type_id(free) == 3]
-    free = free[np.argsort(-shapely.area(free), kind="stable")][:_CELLS]
+    free = free[np.argsort(shapely.distance(free, shapely.Point(near)), kind="stable")][:_CELLS]
     for share in _STEPS:
         box = share * height * np.array([_LETTER * max(len(text), 1), 1.0])
         for cell in free:
-            middle, room = roomiest(cell)
-            if 2.0 * room < box[1]:
+            if cell.area < box.prod():
                 continue
-            points = np.asarray(cell.exterior.coords)[:-1]
-            for angle in (0.0, _readable(rectangle(points)[0])):
-                c, s = np.cos(angle), np.sin(angle)
-                corners = middle + box * _CORNERS @ np.array([[c, s], [-s, c]])
-                if cell.contains(shapely.Polygon(corners)):
-                    return middle, share * height, angle
+            way = _readable(rectangle(np.asarray(cell.exterior.coords)[:-1])[0])
+            for middle in (shapely.get_coordinates(cell.centroid)[0], roomiest(cell)[0]):
+                for angle in (0.0, way):
+                    c, s = np.cos(angle), np.sin(angle)
+                    corners = middle + box * _CORNERS @ np.array([[c, s], [-s, c]])
+                    if cell.contains(shapely.Polygon(corners)):
+                        return middle, share * height, angle
     return None
 
 

@@ -7,7 +7,7 @@ import base64
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.typing import Json
+from gso.typing import Array, Json
 
 #: Level of a quantised number that is not finite, and the largest of the others.
 _MISSING, _LEVELS = 65535, 65534
@@ -23,7 +23,7 @@ class Arrays:
     --------
     >>> arrays = Arrays()
     >>> arrays.quantised([[0.0, 5.0], [1.0, 5.0]])
-    {'at': 0, 'count': 2, 'columns': 2, 'low': [0.0, 5.0], 'step': [1.52...e-05, 0.0]}
+    {'at': 0, 'count': 2, 'columns': 2, 'low': [0.0, 5.0], 'step': [1.52592548e-05, 0.0]}
     >>> arrays.indices([[0, 1], [1, 2]])
     {'at': 8, 'count': 2, 'columns': 2, 'bits': 16}
     >>> len(arrays.text())
@@ -44,7 +44,7 @@ class Arrays:
         step = np.where(np.isfinite(high), high - low, 0.0) / _LEVELS
         share = np.where(finite, table - low, 0.0) / np.where(step > 0, step, 1.0)
         levels = np.where(finite, np.clip(np.round(share), 0, _LEVELS), _MISSING)
-        return self._add(levels.astype("<u2")) | {"low": low.tolist(), "step": step.tolist()}
+        return self._add(levels.astype("<u2")) | {"low": _rounded(low), "step": _rounded(step)}
 
     def indices(self, values: ArrayLike) -> Json:
         """Add indices (n, d), which are not negative."""
@@ -63,3 +63,7 @@ class Arrays:
         self._bytes += b"\x00" * (-len(self._bytes) % 4)
         columns = table.shape[1] if table.ndim > 1 else 1
         return {"at": at, "count": len(table), "columns": columns}
+
+
+def _rounded(values: Array) -> list[float]:
+    return [float(f"{x:.9g}") for x in values]

@@ -34,6 +34,8 @@ VALUES = {
     "bending": ("1/m", "largest curvature in any direction: one over the radius"),
 }
 _SHARE, _METRE = 100.0, 1000.0
+#: Relative difference up to which values are one.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,8 +222,8 @@ def _value(arrays: Arrays, values: Array) -> Json | float | None:
     """Describe values at vertices: one number where they are all the same."""
     if not np.isfinite(values).any():
         return None
-    if np.isfinite(values).all() and np.ptp(values) == 0.0:
-        return float(values[0])
+    if np.isfinite(values).all() and np.ptp(values) <= _SAME * np.abs(values).max():
+        return _short_number(float(values.mean()))
     return arrays.quantised(values)
 
 

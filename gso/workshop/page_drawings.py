@@ -15,9 +15,9 @@ from gso.workshop.part import Drawing, Label, Part
 from gso.workshop.writers import strokes
 
 #: Margin, least length of notches, and height of names, as shares of a drawing's larger side.
-_ROOM, _NOTCH, _NAME = 0.015, 0.02, 0.05
+_ROOM, _NOTCH, _NAME = 0.015, 0.02, 0.045
 #: Height of a name as a share of a sheet's larger side.
-_ON_SHEET = 0.02
+_ON_SHEET = 0.018
 #: Kinds of lines whose paths are joined to one.
 _PLAIN = ("grain", "arrow", "mark", "crease", "guide", "seam")
 

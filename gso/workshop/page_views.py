@@ -58,7 +58,7 @@ class Views:
         return sorted(seams), list(dict.fromkeys(others))
 
     def place(self, part: str) -> tuple[Picture, str, list[Array]] | None:
-        """Return the picture of a part's place, its identifier, and the outlines of its panels.
+        """Return the picture of a part's place, its identifier, and outlines of its panels.
 
         None if its design is not pictured.
         """
@@ -68,7 +68,7 @@ class Views:
         places = self.places[design]
         side = places.side(first)
         own = [k for number, k in self._at[part] if number == design]
-        loops = [loop for k in own for loop in places.outline(side, k)]
+        loops = [loop for k in own for loop in places.shadow(side, k)]
         return places.pictures[side], f"view-{design}-{side}", loops
 
 

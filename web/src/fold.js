@@ -123,10 +123,6 @@ export class Fold {
   // Write the points (3 n) for a share of the angles: 0 is flat, 1 is in place.
   at(share, out) {
     const { motion, flat, triangles, parent, edge, angle } = this;
-    if (share === 1 && this.rest.some(Boolean)) {
-      out.set(this.points);
-      return;
-    }
     for (const f of this.order) {
       const m = 12 * f;
       if (parent[f] < 0) {
@@ -134,24 +130,34 @@ export class Fold {
         continue;
       }
       const p = 12 * parent[f];
-      const [a, b] = [edge[2 * f], edge[2 * f + 1]];
-      const [ax, ay] = [flat[2 * a], flat[2 * a + 1]];
-      let [dx, dy] = [flat[2 * b] - ax, flat[2 * b + 1] - ay];
+      const a = edge[2 * f];
+      const b = edge[2 * f + 1];
+      const ax = flat[2 * a];
+      const ay = flat[2 * a + 1];
+      let dx = flat[2 * b] - ax;
+      let dy = flat[2 * b + 1] - ay;
       const length = Math.hypot(dx, dy) || 1;
       dx /= length;
       dy /= length;
       const c = Math.cos(share * angle[f]);
       const s = Math.sin(share * angle[f]);
-      const turn = [
-        c + dx * dx * (1 - c), dx * dy * (1 - c), dy * s,
-        dx * dy * (1 - c), c + dy * dy * (1 - c), -dx * s,
-        -dy * s, dx * s, c,
-      ];
-      const shift = [ax - turn[0] * ax - turn[1] * ay, ay - turn[3] * ax - turn[4] * ay, -turn[6] * ax - turn[7] * ay];
-      for (let i = 0; i < 3; i++) {
-        const [x, y, z] = [motion[p + 4 * i], motion[p + 4 * i + 1], motion[p + 4 * i + 2]];
-        for (let j = 0; j < 3; j++) motion[m + 4 * i + j] = x * turn[j] + y * turn[3 + j] + z * turn[6 + j];
-        motion[m + 4 * i + 3] = x * shift[0] + y * shift[1] + z * shift[2] + motion[p + 4 * i + 3];
+      // The rotation about the edge: rows (xx, xy, ys), (xy, yy, -xs), (-ys, xs, c).
+      const xx = c + dx * dx * (1 - c);
+      const xy = dx * dy * (1 - c);
+      const yy = c + dy * dy * (1 - c);
+      const xs = dx * s;
+      const ys = dy * s;
+      const sx = ax - xx * ax - xy * ay;
+      const sy = ay - xy * ax - yy * ay;
+      const sz = ys * ax - xs * ay;
+      for (let i = 0; i < 12; i += 4) {
+        const x = motion[p + i];
+        const y = motion[p + i + 1];
+        const z = motion[p + i + 2];
+        motion[m + i] = x * xx + y * xy - z * ys;
+        motion[m + i + 1] = x * xy + y * yy + z * xs;
+        motion[m + i + 2] = x * ys - y * xs + z * c;
+        motion[m + i + 3] = x * sx + y * sy + z * sz + motion[p + i + 3];
       }
     }
     out.fill(0);
@@ -159,7 +165,8 @@ export class Fold {
       const m = 12 * f;
       for (let k = 0; k < 3; k++) {
         const v = triangles[3 * f + k];
-        const [x, y] = [flat[2 * v], flat[2 * v + 1]];
+        const x = flat[2 * v];
+        const y = flat[2 * v + 1];
         for (let i = 0; i < 3; i++)
           out[3 * v + i] += motion[m + 4 * i] * x + motion[m + 4 * i + 1] * y + motion[m + 4 * i + 3];
       }

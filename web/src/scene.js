@@ -1,9 +1,8 @@
 // The designs and their panels in space: few buffers for all of them, drawn when something changes.
 
 import {
-  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, HemisphereLight, LineBasicMaterial,
-  LineSegments, Mesh, MeshLambertMaterial, NearestFilter, PerspectiveCamera, Scene, ShaderMaterial,
-  Vector3, WebGLRenderTarget, WebGLRenderer,
+  BufferAttribute, BufferGeometry, Color, DoubleSide, LineBasicMaterial, LineSegments, Mesh, NearestFilter,
+  PerspectiveCamera, Scene, ShaderMaterial, Vector3, WebGLRenderTarget, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
@@ -14,12 +13,52 @@ import { Fold } from "./fold.js";
 
 // Columns of the picture in which what is seen is looked up.
 const FINE = 320;
+// Milliseconds between frames from which on fewer pixels are drawn while something moves.
+const SLOW = 40;
+
+// Faces of one colour each, lit from where the viewer is; both sides look the same. This takes a
+// small part of the time of the materials of three.js where there is no graphics processor.
+const VERTEX = `
+attribute vec3 own;
+varying vec3 place;
+varying vec3 shade;
+void main() {
+  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  place = seen.xyz;
+  shade = own;
+  gl_Position = projectionMatrix * seen;
+}`;
+const FRAGMENT = `
+uniform float opacity;
+varying vec3 place;
+varying vec3 shade;
+void main() {
+  vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+  float light = abs(dot(normal, vec3(-0.36, 0.48, 0.8)));
+  gl_FragColor = vec4(shade * (0.55 + 0.45 * light), opacity);
+}`;
+
+const faces = () =>
+  new ShaderMaterial({
+    vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide, uniforms: { opacity: { value: 1 } },
+    polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+  });
+
+// Whether a processor draws in place of a graphics processor.
+function isSlow() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const more = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = more ? String(context.getParameter(more.UNMASKED_RENDERER_WEBGL)) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
 
 export class Stage {
   constructor(data, canvas) {
     this.data = data;
     this.canvas = canvas;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.isSlow = isSlow();
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.isSlow, alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(30, 1, 0.1, 10);
     this.camera.up.set(0, 0, 1);
@@ -29,7 +68,6 @@ export class Stage {
     this.share = 1;
     this.explosion = 0;
     this.fill();
-    this.light();
     this.look();
     this.target = new WebGLRenderTarget(FINE, FINE, { minFilter: NearestFilter, magFilter: NearestFilter });
   }
@@ -94,13 +132,10 @@ export class Stage {
     this.shade = new BufferAttribute(this.colours, 3, true);
     const surface = new BufferGeometry();
     surface.setAttribute("position", this.place);
-    surface.setAttribute("color", this.shade);
+    surface.setAttribute("own", this.shade);
     surface.setAttribute("name", new BufferAttribute(this.names, 3, true));
     surface.setIndex(new BufferAttribute(triangles, 1));
-    this.material = new MeshLambertMaterial({
-      vertexColors: true, flatShading: true, side: DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
-    });
+    this.material = faces();
     this.surface = new Mesh(surface, this.material);
     this.byName = new ShaderMaterial({
       side: DoubleSide,
@@ -133,8 +168,9 @@ export class Stage {
       }
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
+    geometry.setAttribute("own", new BufferAttribute(new Uint8Array(points.length), 3, true));
     geometry.setIndex(new BufferAttribute(new Uint32Array(index), 1));
-    this.designs = new Mesh(geometry, new MeshLambertMaterial({ flatShading: true, side: DoubleSide }));
+    this.designs = new Mesh(geometry, faces());
     this.designs.visible = false;
   }
 
@@ -142,13 +178,6 @@ export class Stage {
     const line = new LineSegments2(new LineSegmentsGeometry(), new LineMaterial({ linewidth: width, depthTest: true }));
     line.visible = false;
     return line;
-  }
-
-  light() {
-    const sun = new DirectionalLight(0xffffff, 1.9);
-    sun.position.set(-0.5, 0.7, 1);
-    this.camera.add(sun);
-    this.scene.add(this.camera, new HemisphereLight(0xffffff, 0xa0a0a8, 1.7));
   }
 
   // Colours of the theme.
@@ -159,25 +188,26 @@ export class Stage {
     this.lines[2].material.color = own("--valley");
     this.marked.material.color = own("--accent");
     this.seam.material.color = own("--seam");
-    this.designs.material.color = own("--design");
+    const grey = own("--design").convertLinearToSRGB().toArray().map((x) => Math.round(255 * x));
+    const shade = this.designs.geometry.attributes.own;
+    for (let k = 0; k < shade.array.length; k++) shade.array[k] = grey[k % 3];
+    shade.needsUpdate = true;
     this.ask();
   }
 
   // The view of the pictures: axes are columns right, up, towards the viewer.
   look() {
     const axes = this.data.view;
-    const [low, high] = this.box;
-    const middle = new Vector3(...low.map((x, k) => 0.5 * (x + high[k])));
-    this.size = Math.hypot(...low.map((x, k) => high[k] - x)) || 1;
+    const { middle, size } = this.around;
     const toward = new Vector3(...axes.map((row) => row[2]));
     const steep = Math.abs(toward.z) > 0.999;
     if (steep) toward.add(new Vector3(...axes.map((row) => -0.02 * row[1]))).normalize();
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(toward, 1.55 * this.size);
-    this.camera.near = 0.01 * this.size;
-    this.camera.far = 60 * this.size;
-    this.controls.minDistance = 0.05 * this.size;
-    this.controls.maxDistance = 20 * this.size;
+    this.camera.position.copy(middle).addScaledVector(toward, 1.6 * size);
+    this.camera.near = 0.01 * size;
+    this.camera.far = 60 * size;
+    this.controls.minDistance = 0.05 * size;
+    this.controls.maxDistance = 20 * size;
     this.resize();
     this.controls.update();
   }
@@ -185,12 +215,20 @@ export class Stage {
   resize() {
     const { clientWidth: wide, clientHeight: high } = this.canvas.parentElement;
     if (!wide || !high) return;
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.setSize(wide, high, false);
+    this.sharpen(true);
     this.camera.aspect = wide / high;
     this.camera.fov = wide < high ? (360 / Math.PI) * Math.atan((Math.tan(Math.PI / 12) * high) / wide) : 30;
     this.camera.updateProjectionMatrix();
     this.ask();
+  }
+
+  // Draw all pixels, or fewer of them while something moves on slow machines.
+  sharpen(on) {
+    const ratio = Math.min(window.devicePixelRatio, 2);
+    const own = on ? (this.isSlow ? 2 : ratio) : 0.6;
+    if (this.renderer.getPixelRatio() !== own) this.renderer.setPixelRatio(own);
+    this.isSharp = on;
   }
 
   turn(right, up) {
@@ -235,8 +273,24 @@ export class Stage {
       }
     }
     this.place.needsUpdate = true;
+    this.follow();
     this.drawMarks();
     this.ask();
+  }
+
+  // Keep the distance in proportion to the size of what is shown, and its middle in view.
+  follow() {
+    const before = this.around;
+    const [low, high] = boxOf([this.points]);
+    const middle = new Vector3(...low.map((x, k) => 0.5 * (x + high[k])));
+    this.around = { middle, size: Math.hypot(...low.map((x, k) => high[k] - x)) || 1 };
+    if (!before) return;
+    const grown = this.around.size / before.size;
+    const moved = this.controls.target.clone().sub(before.middle).multiplyScalar(grown).add(middle);
+    const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(grown);
+    this.controls.target.copy(moved);
+    this.camera.position.copy(moved).add(offset);
+    this.camera.lookAt(moved);
   }
 
   // Show only the first panels in the order of joining.
@@ -331,12 +385,27 @@ export class Stage {
   }
 
   draw() {
+    const now = performance.now();
+    const passed = now - (this.last ?? -Infinity);
+    this.last = now;
+    if (passed < 300) {
+      this.pace = 0.7 * (this.pace ?? passed) + 0.3 * passed;
+      if (this.pace > SLOW || this.isSlow) this.sharpen(false);
+    }
     this.renderer.render(this.scene, this.camera);
     for (const call of this.listeners.frame) call();
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => {
-      if (!this.asked) for (const call of this.listeners.rest) call();
-    }, 120);
+    this.timer = setTimeout(() => this.settle(), 150);
+  }
+
+  // Once nothing moves.
+  settle() {
+    if (this.asked) return;
+    if (!this.isSharp) {
+      this.sharpen(true);
+      this.renderer.render(this.scene, this.camera);
+    }
+    for (const call of this.listeners.rest) call();
   }
 
   // The copy that is seen in each pixel of a small picture, from below upwards; -1 for none.
@@ -346,7 +415,7 @@ export class Stage {
     this.target.setSize(wide, high);
     const bytes = new Uint8Array(4 * wide * high);
     if (!this.surface.visible) return { wide, high, owner: new Int32Array(wide * high).fill(-1) };
-    const others = this.scene.children.filter((one) => one !== this.surface && one.visible && !one.isLight && one !== this.camera);
+    const others = this.scene.children.filter((one) => one !== this.surface && one.visible);
     for (const one of others) one.visible = false;
     this.surface.material = this.byName;
     this.renderer.setRenderTarget(this.target);
