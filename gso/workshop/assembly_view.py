@@ -28,6 +28,8 @@ _MARGIN, _FINE, _POINTS, _NEAR = 12, 2, 9, 3.0
 _DARK = 0.45
 #: Degrees of brightness of pictures with few of them.
 _DEGREES = 24
+#: Least distance between the numbers of seams and other texts, in pixels.
+_APART = 12.0
 #: Colour of outlines in the image of the faces.
 _EDGE = (110, 110, 108)
 
@@ -179,7 +181,8 @@ class Stage:
             Panels whose names and lines are drawn; others have their outlines in the image of
             the faces only. By default all.
         seams : sequence of Mating
-            Seams that are drawn in front of everything, with their numbers.
+            Seams that are drawn in front of everything, with their numbers where these do not lie
+            on each other.
         """
         shown = self._triangle >= 0
         image = np.full((*self._depth.shape, 3), 255, np.uint8)
@@ -209,7 +212,9 @@ class Stage:
                 [np.stack([line[:-1], line[1:]], axis=1) for line in drawn]
             )
             for seam, line in zip(seams, drawn, strict=True):
-                names.append(Name(str(seam.number), _middle(line), f"seam {seam.number}", "seam"))
+                at = _middle(line) - [0.0, 0.5 * TALL]
+                if all(np.abs(at - name.at).max() > _APART for name in names):
+                    names.append(Name(str(seam.number), at, f"seam {seam.number}", "seam"))
         return Picture(self.size, image, lines, tuple(names))
 
     def shadow(self, panel: int) -> list[Array]:

@@ -16,6 +16,8 @@ from gso.workshop.panels import Made
 PICTURES, _SIZE = 60, 300
 #: Colours of what is joined already, and of what is joined now.
 _OLD, _NEW = (0.86, 0.86, 0.84), (0.98, 0.68, 0.32)
+#: How many times as much must be seen from behind for a picture from there.
+_BEHIND = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +50,20 @@ class StepPicture:
     steps : tuple of Step
     picture : Picture
         What is joined up to the last of them; their panels are coloured.
+    is_behind : bool
+        Whether it is seen from behind.
     """
 
     first: int
     steps: tuple[Step, ...]
     picture: Picture
+    is_behind: bool = False
 
-    def in_words(self, made: Made) -> list[str]:
-        """Say what is joined, a sentence for each panel."""
-        return [in_words(step, made) for step in self.steps]
+    def title(self) -> str:
+        """Say which steps it shows."""
+        last = self.first + len(self.steps) - 1
+        said = f"step {last}" if last == self.first else f"steps {self.first} to {last}"
+        return said + (", from behind" if self.is_behind else "")
 
 
 def in_words(step: Step, made: Made) -> str:
@@ -112,7 +119,7 @@ def order(made: Made) -> list[Step]:
 
 
 def pictures(made: Made, steps: Sequence[Step], most: int = PICTURES) -> list[StepPicture]:
-    """Draw the steps of a design, from the side from which more of its panels are seen.
+    """Draw the steps of a design, each from the side from which more of what is new is seen.
 
     Parameters
     ----------
@@ -123,23 +130,22 @@ def pictures(made: Made, steps: Sequence[Step], most: int = PICTURES) -> list[St
         Largest number of pictures: where there are more steps, each shows several.
     """
     each = -(-len(steps) // most)
-    views = sides(made.panels)
-    stages = [Stage(made, view, _SIZE) for view in views]
-    for stage in stages:
-        stage.add(range(len(made.panels)))
-    seen = [len(np.unique(stage.owner)) for stage in stages]
-    stage = Stage(made, views[int(np.argmax(seen))], _SIZE)
+    stages = [Stage(made, view, _SIZE) for view in sides(made.panels)]
     seams = {seam.number: seam for seam in made.matings}
     out = []
     for first in range(0, len(steps), each):
         own = tuple(steps[first : first + each])
         new = [step.panel for step in own]
-        stage.add(new)
+        seen = []
+        for stage in stages:
+            stage.add(new)
+            seen.append(int(np.isin(stage.owner, new).sum()))
+        is_behind = seen[1] > _BEHIND * seen[0]
         colours = np.full((len(made.panels), 3), _OLD)
         colours[new] = _NEW
         joined = [seams[n] for step in own for n in step.seams]
-        drawn = stage.picture(colours, new=new, seams=joined)
-        out.append(StepPicture(first + 1, own, drawn))
+        drawn = stages[int(is_behind)].picture(colours, new=new, seams=joined)
+        out.append(StepPicture(first + 1, own, drawn, is_behind))
     return out
 
 

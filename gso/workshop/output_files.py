@@ -79,9 +79,11 @@ def written(
     """Write all files but the certificate; delete earlier ones that are not written again."""
     files: list[str] = []
 
-    def write(drawing: Drawing, name: str, suffix: str) -> None:
+    views = Views(shown, certificate)
+
+    def write(drawing: Drawing, name: str, suffix: str, **more: object) -> None:
         (place / name).parent.mkdir(exist_ok=True)
-        writers.write(drawing, place / name, **drawings.options(suffix))
+        writers.write(drawing, place / name, **drawings.options(suffix), **more)
         files.append(name)
 
     for suffix in drawings.formats:
@@ -91,7 +93,9 @@ def written(
         for number, drawing in enumerate(sheets, start=1):
             write(drawing, f"sheets/sheet-{number}.{suffix}", suffix)
     if drawings.paper is not None and parts:
-        write(beside(parts), PAPER, "pdf")
+        found = {part.name: views.place(part.name) for part in parts}
+        at = {name: (one[0], one[2]) for name, one in found.items() if one is not None}
+        write(beside(parts), PAPER, "pdf", places=at, steps=views.step_texts())
     for one in shown:
         for panel in one.made.panels:
             name = f"surfaces/{panel.name}.obj"
@@ -101,7 +105,6 @@ def written(
     if solids:
         io.save_solids(solids, place / SOLIDS)
         files.append(SOLIDS)
-    views = Views(shown, certificate)
     write_bytes(place / PAGE, page(certificate, parts, sheets, views).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):

@@ -71,6 +71,18 @@ class Views:
         loops = [loop for k in own for loop in places.shadow(side, k)]
         return places.pictures[side], f"view-{design}-{side}", loops
 
+    def step_texts(self) -> list[tuple[str, Picture, list[str]]]:
+        """Return title, picture and lines of text of every step of every design."""
+        return [
+            (
+                f"{one.made.name}: {shot.title()}",
+                shot.picture,
+                [in_words(step, one.made) for step in shot.steps],
+            )
+            for one, own in zip(self.shown, self.steps, strict=False)
+            for shot in own
+        ]
+
 
 def place_picture(views: Views, part: str) -> str:
     """Return the picture of a part's place as SVG; empty if its design is not pictured."""
@@ -103,6 +115,7 @@ def assembly_sheet(views: Views, address: Callable[[str], str]) -> list[str]:
                 f'<li value="{shot.first + k}">{escape(in_words(step, one.made))}</li>'
                 for k, step in enumerate(shot.steps)
             )
-            lines.append(f"<li>{shot.picture.svg(address)}<ol>{said}</ol></li>")
+            side = "<p>from behind</p>" if shot.is_behind else ""
+            lines.append(f"<li>{shot.picture.svg(address)}{side}<ol>{said}</ol></li>")
         lines.append("</ol>")
     return lines

@@ -15,6 +15,8 @@ import { Fold } from "./fold.js";
 const FINE = 320;
 // Milliseconds between frames from which on fewer pixels are drawn while something moves.
 const SLOW = 40;
+// Ends of lines up to which these are drawn then.
+const MANY = 8000;
 
 // Faces of one colour each, lit from where the viewer is; both sides look the same. This takes a
 // small part of the time of the materials of three.js where there is no graphics processor.
@@ -202,14 +204,30 @@ export class Stage {
     const toward = new Vector3(...axes.map((row) => row[2]));
     const steep = Math.abs(toward.z) > 0.999;
     if (steep) toward.add(new Vector3(...axes.map((row) => -0.02 * row[1]))).normalize();
+    this.resize();
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(toward, 1.6 * size);
+    this.camera.position.copy(middle).addScaledVector(toward, this.distance(axes, middle));
     this.camera.near = 0.01 * size;
     this.camera.far = 60 * size;
     this.controls.minDistance = 0.05 * size;
     this.controls.maxDistance = 20 * size;
-    this.resize();
+    this.camera.updateProjectionMatrix();
     this.controls.update();
+    this.ask();
+  }
+
+  // The distance from which everything is seen, from the direction of the last axis.
+  distance(axes, middle) {
+    const slope = Math.tan((this.camera.fov * Math.PI) / 360);
+    const centre = middle.toArray();
+    let far = 0;
+    for (let v = 0; v < this.points.length; v += 3) {
+      const own = [0, 0, 0];
+      for (let i = 0; i < 3; i++) for (let j = 0; j < 3; j++) own[j] += axes[i][j] * (this.points[v + i] - centre[i]);
+      const across = Math.max(Math.abs(own[1]), Math.abs(own[0]) / this.camera.aspect);
+      far = Math.max(far, own[2] + (1.08 * across) / slope);
+    }
+    return far || 1;
   }
 
   resize() {
@@ -228,6 +246,8 @@ export class Stage {
     const ratio = Math.min(window.devicePixelRatio, 2);
     const own = on ? (this.isSlow ? 2 : ratio) : 0.6;
     if (this.renderer.getPixelRatio() !== own) this.renderer.setPixelRatio(own);
+    // Many lines take longer than the faces; the colours of parts show where they end.
+    for (const line of this.lines) if (line.geometry.index.count > MANY) line.layers.set(on ? 0 : 1);
     this.isSharp = on;
   }
 

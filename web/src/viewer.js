@@ -5,6 +5,8 @@ import { Stage } from "./scene.js";
 import { isInches, length, onUnit, plain, unitName, withUnit } from "./units.js";
 
 const INCH = 25.4;
+// Names that are drawn while something moves: those of the parts that are the largest on the screen.
+const MOVING = 80;
 const LABELS = { deviation: "deviation", strain: "strain", curvature: "Gaussian curvature", bending: "bending" };
 
 const FRAME = `
@@ -330,7 +332,7 @@ export class Viewer {
     pen.clearRect(0, 0, wide, high);
     if (!this.form.elements.names.checked || !stage.surface.visible) return;
     const taken = [];
-    const order = [...this.visible].sort((a, b) => b[1][2] - a[1][2]);
+    const order = [...this.visible].sort((a, b) => b[1][2] - a[1][2]).slice(0, this.still ? Infinity : MOVING);
     for (const [k, [x, y]] of order) {
       const copy = stage.copies[k];
       const text = this.data.panels[copy.panel].short;
