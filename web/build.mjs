@@ -49,5 +49,8 @@ for (const name of sources.sort()) {
   digest.update(readFileSync(join(here, name)));
 }
 const packages = JSON.parse(readFileSync(join(here, "package.json"), "utf-8")).devDependencies;
-const said = { sources: digest.digest("hex"), packages };
+const files = {};
+for (const name of ["page.js", "page.css", "LICENSE-three.txt"])
+  files[name] = createHash("sha256").update(readFileSync(join(out, name))).digest("hex");
+const said = { sources: digest.digest("hex"), files, packages };
 writeFileSync(join(out, "built.json"), JSON.stringify(said, null, 2) + "\n");

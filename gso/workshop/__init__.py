@@ -13,6 +13,7 @@ from gso.workshop.design_panels import made
 from gso.workshop.designs import Design, designs_of
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
+from gso.workshop.name_places import name_place
 from gso.workshop.nesting import nest
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
@@ -40,6 +41,7 @@ __all__ = [
     "fitted",
     "guide_lines",
     "made",
+    "name_place",
     "nest",
     "of_net",
     "of_surface",

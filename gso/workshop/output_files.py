@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gso import io
 from gso.io.atomic import write_bytes
@@ -81,7 +82,7 @@ def written(
 
     views = Views(shown, certificate)
 
-    def write(drawing: Drawing, name: str, suffix: str, **more: object) -> None:
+    def write(drawing: Drawing, name: str, suffix: str, **more: Any) -> None:
         (place / name).parent.mkdir(exist_ok=True)
         writers.write(drawing, place / name, **drawings.options(suffix), **more)
         files.append(name)

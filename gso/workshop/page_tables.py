@@ -74,7 +74,11 @@ def designs_table(designs: Sequence[Json]) -> str:
     """Return the table of designs, with what was measured."""
     heads = ("design", "copies", "parts", "parts per m²", "distance, mean mm", "largest mm")
     more = ("allowed mm", "strain %, largest", "smallest bend radius mm", "seam mismatch mm")
-    rows = ["<table><tr>", *(f"<th>{head(h)}</th>" for h in (*heads, *more, "verdict")), "</tr>"]
+    rows = [
+        '<div class="wide"><table><tr>',
+        *(f"<th>{head(h)}</th>" for h in (*heads, *more, "verdict")),
+        "</tr>",
+    ]
     for one in designs:
         strain = one.get("strain_max")
         cells = [
@@ -89,7 +93,7 @@ def designs_table(designs: Sequence[Json]) -> str:
             _verdict(one["reasons"]),
         ]
         rows.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
-    return "".join([*rows, "</table>"])
+    return "".join([*rows, "</table></div>"])
 
 
 def _table(heads: Sequence[str], rows: Sequence[tuple[str, list[str]]], kind: str) -> str:

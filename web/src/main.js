@@ -25,7 +25,7 @@ function start() {
     for (const one of document.querySelectorAll(".chosen")) one.classList.remove("chosen");
     if (number === null) chooseSeam(null);
     else
-      for (const one of document.querySelectorAll(`main [data-part="${number}"]`)) one.classList.add("chosen");
+      for (const one of document.querySelectorAll(`:is(tr, figure, g)[data-part="${number}"]`)) one.classList.add("chosen");
     if (scroll) place.scrollIntoView({ block: "nearest" });
   }
 

@@ -277,7 +277,7 @@ class _Book:
                 c.drawString(low[0], low[1] + foot - 1.5 * _TEXT * (number + 1) + 1.0, line)
             shape = np.array(picture.size) / max(picture.size)
             size = float(((cell - [6.0, foot + 4.0 * _TEXT]) / shape).min())
-            self._picture(picture, low + [0.0, foot + 2.0], size)
+            self._picture(picture, low + np.array([0.0, foot + 2.0]), size)
         c.setFillGray(0.0)
         c.setFont("Helvetica", _TEXT / _CAPITAL)
         said_page = f"order of joining, page {self._page} of {self._pages}"
