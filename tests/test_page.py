@@ -14,14 +14,24 @@ import pytest
 import gso
 from gso.mesh import Mesh, cut
 from gso.pattern import Pattern
-from gso.workshop import Drawing, Finish, Part, fitted, name_place, of_net, of_surface, parts_from
-from gso.workshop.certificate import design_record
-from gso.workshop.joining import order, pictures
-from gso.workshop.page import page
-from gso.workshop.page_data import Shown, page_data
-from gso.workshop.page_drawings import sheet_drawing
-from gso.workshop.page_views import Views
-from gso.workshop.polygons import region
+from gso.workshop import (
+    Drawing,
+    Finish,
+    Part,
+    Shown,
+    Views,
+    data_for_page,
+    design_record,
+    fitted,
+    name_place,
+    of_net,
+    of_surface,
+    order_of_joining,
+    page_html,
+    parts_from,
+    sheet_drawing,
+    step_pictures,
+)
 from tests.browser import PROGRAM, Browser
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -62,7 +72,7 @@ def job_of(mesh: Mesh, made, copies: tuple[Mesh, ...] = ()):
 
 def html_of(*given) -> str:
     certificate, parts, views = job_of(*given)
-    return page(certificate, parts, [], views)
+    return page_html(certificate, parts, [], views)
 
 
 def read(html: str, name: str) -> str:
@@ -86,7 +96,7 @@ def indices(data: dict, entry: dict) -> np.ndarray:
 
 
 def data_of(certificate, parts, views) -> dict:
-    data = page_data(views.shown, parts, certificate)
+    data = data_for_page(views.shown, parts, certificate)
     return data | {"bytes": base64.b64decode(data["arrays"])}
 
 
@@ -168,7 +178,7 @@ class TestData:
 class TestOrder:
     def test_each_part_is_joined_to_earlier_ones_where_it_can_be(self):
         _, made = vault(3, 4)
-        steps = order(made)
+        steps = order_of_joining(made)
         assert sorted(step.panel for step in steps) == list(range(12))
         joined = set()
         seams = {seam.number: {seam.one.panel, seam.two.panel} for seam in made.matings}
@@ -184,13 +194,13 @@ class TestOrder:
         mesh = box()
         net = gso.unfold(mesh)
         made = of_net("box", net)
-        (step,) = order(made)
+        (step,) = order_of_joining(made)
         assert len(step.closed) == len(made.matings) == 7
 
     def test_many_steps_share_pictures(self):
         _, made = vault(3, 4, 2)
-        steps = order(made)
-        drawn = pictures(made, steps, most=5)
+        steps = order_of_joining(made)
+        drawn = step_pictures(made, steps, most=5)
         assert [(shot.first, len(shot.steps)) for shot in drawn] == [
             (1, 3),
             (4, 3),
@@ -224,7 +234,7 @@ class TestDrawings:
             c, s = np.cos(angle), np.sin(angle)
             corners = np.array([[-wide, -high], [wide, -high], [wide, high], [-wide, high]]) / 2
             text = shapely.Polygon(middle + corners @ np.array([[c, s], [-s, c]]))
-            assert region(part.outline).buffer(1e-6).contains(text)
+            assert shapely.Polygon(part.outline).buffer(1e-6).contains(text)
             assert not any(text.intersects(shapely.LineString(b.line)) for b in part.bends)
 
     def test_parts_on_sheets_are_where_the_nesting_put_them(self):

@@ -74,7 +74,7 @@ def in_words(step: Step, made: Made) -> str:
     return said + (f", joined along {_seams(step.seams)}" if step.seams else "")
 
 
-def order(made: Made) -> list[Step]:
+def order_of_joining(made: Made) -> list[Step]:
     """Order the panels of a design: the largest first, then neighbours.
 
     The next one is always that which has the longest seams with those that are joined; the larger
@@ -87,7 +87,7 @@ def order(made: Made) -> list[Step]:
     >>> points = [[x, y, z] for z in (0.0, 3.0) for y in (0.0, 2.0) for x in (0.0, 1.0)]
     >>> sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
     >>> made = of_net("box", gso.unfold(gso.Mesh(points, sides)))
-    >>> [(step.panel, len(step.closed)) for step in order(made)]
+    >>> [(step.panel, len(step.closed)) for step in order_of_joining(made)]
     [(0, 7)]
     """
     count = len(made.panels)
@@ -118,14 +118,14 @@ def order(made: Made) -> list[Step]:
     return steps
 
 
-def pictures(made: Made, steps: Sequence[Step], most: int = PICTURES) -> list[StepPicture]:
+def step_pictures(made: Made, steps: Sequence[Step], most: int = PICTURES) -> list[StepPicture]:
     """Draw the steps of a design, each from the side from which more of what is new is seen.
 
     Parameters
     ----------
     made : Made
     steps : sequence of Step
-        Of :func:`order`.
+        Of :func:`order_of_joining`.
     most : int
         Largest number of pictures: where there are more steps, each shows several.
     """

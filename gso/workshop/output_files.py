@@ -12,7 +12,7 @@ from gso.io.atomic import write_bytes
 from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER, SOLIDS
-from gso.workshop.page import page
+from gso.workshop.page import page_html
 from gso.workshop.page_data import Shown
 from gso.workshop.page_views import Views
 from gso.workshop.part import Drawing, Part
@@ -106,7 +106,7 @@ def written(
     if solids:
         io.save_solids(solids, place / SOLIDS)
         files.append(SOLIDS)
-    write_bytes(place / PAGE, page(certificate, parts, sheets, views).encode())
+    write_bytes(place / PAGE, page_html(certificate, parts, sheets, views).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from importlib.resources import files
 
 from gso.typing import Json
 from gso.wording import listed, places
-from gso.workshop.page_data import page_data
+from gso.workshop.page_data import data_for_page
 from gso.workshop.page_drawings import part_drawing, sheet_drawing
 from gso.workshop.page_tables import designs_table, parts_table, seams_table
 from gso.workshop.page_text import addresses, guided, in_script, mm
@@ -34,7 +34,9 @@ _KINDS = {
 }
 
 
-def page(certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing], views: Views) -> str:
+def page_html(
+    certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing], views: Views
+) -> str:
     """Return the page as HTML.
 
     Parameters
@@ -51,7 +53,7 @@ def page(certificate: Json, parts: Sequence[Part], sheets: Sequence[Drawing], vi
     good = certificate["usable"]
     title = listed([escape(one["name"]) for one in certificate["designs"]], 3)
     said = "can be made as it was asked for" if good else "cannot be made as it was asked for"
-    data = page_data(views.shown, parts, certificate)
+    data = data_for_page(views.shown, parts, certificate)
     arrays = data.pop("arrays")
     lines = [
         "<!DOCTYPE html>",

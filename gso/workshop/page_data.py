@@ -21,7 +21,7 @@ from gso.mesh.view import pale_colours
 from gso.pattern import Bend
 from gso.typing import Array, Json
 from gso.workshop.assembly_view import short, sides
-from gso.workshop.joining import Step, order
+from gso.workshop.joining import Step, order_of_joining
 from gso.workshop.page_arrays import Arrays
 from gso.workshop.panels import Made, Mating, Panel
 from gso.workshop.part import Part
@@ -64,10 +64,10 @@ class Shown:
     @cached_property
     def steps(self) -> list[Step]:
         """The order in which the panels are joined."""
-        return order(self.made)
+        return order_of_joining(self.made)
 
 
-def page_data(shown: Sequence[Shown], parts: Sequence[Part], certificate: Json) -> Json:
+def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Json) -> Json:
     """Describe designs and their parts for the page; lengths in millimetres.
 
     Parameters

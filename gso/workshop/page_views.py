@@ -8,7 +8,7 @@ from html import escape
 
 from gso.typing import Array, Json
 from gso.workshop.assembly_view import Picture, Places, here
-from gso.workshop.joining import StepPicture, in_words, pictures
+from gso.workshop.joining import StepPicture, in_words, step_pictures
 from gso.workshop.page_data import Shown, mates
 from gso.workshop.page_text import drawn_as
 
@@ -42,8 +42,11 @@ class Views:
 
     @cached_property
     def steps(self) -> list[list[StepPicture]]:
-        """Pictures of the order of joining, of designs of several panels."""
-        return [pictures(one.made, one.steps) for one in self.shown[:_PICTURED]]
+        """Pictures of the order of joining; none of designs of one panel."""
+        return [
+            step_pictures(one.made, one.steps) if len(one.steps) > 1 else []
+            for one in self.shown[:_PICTURED]
+        ]
 
     def mates(self, part: str) -> tuple[list[int], list[str]]:
         """Return the numbers of a part's seams, and the names of the panels it is joined to."""
