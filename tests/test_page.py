@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import gso
-from gso.mesh import Mesh, cut
-from gso.pattern import Pattern
+from gso.mesh import Mesh
 from gso.workshop import (
     Drawing,
     Finish,
@@ -49,11 +48,11 @@ def vault(rows: int, columns: int, fine: int = 4, name: str = "vault"):
     he = mesh.half_edges
     inner = he.interior
     apart = inner[panel[he.face[inner]] != panel[he.face[he.twin[inner]]]]
-    opened = cut(mesh, np.stack([he.origin[apart], he.dest[apart]], axis=1))
+    opened = gso.cut(mesh, np.stack([he.origin[apart], he.dest[apart]], axis=1)).opened
     owner = np.zeros(len(opened.vertex), int)
     owner[opened.mesh.faces] = panel[:, None]
     places = flat[opened.vertex] + 0.5 * np.stack(np.divmod(owner, columns), axis=1)
-    pattern = Pattern(places, opened.mesh.faces, opened.vertex, opened.seams)
+    pattern = gso.Pattern(places, opened.mesh.faces, opened.vertex, opened.seams)
     return mesh, of_surface(name, mesh, pattern, {"deviation_max": 0.0})
 
 
@@ -220,7 +219,7 @@ class TestDrawings:
         y, turn = np.mgrid[:9, :17] / 16
         mesh = gso.as_mesh(np.stack([np.sin(turn), y, np.cos(turn)], axis=-1))
         made = of_surface(
-            "arch", mesh, Pattern.whole(mesh, np.stack([turn, y], -1).reshape(-1, 2)), {}
+            "arch", mesh, gso.Pattern.whole(mesh, np.stack([turn, y], -1).reshape(-1, 2)), {}
         )
         _, parts, _ = job_of(mesh, made)
         square = np.array([[0.0, 0], [60, 0], [60, 60], [0, 60]])
