@@ -271,6 +271,8 @@ class Places:
     Parameters
     ----------
     made : Made
+    colours : ndarray, (p, 3), optional
+        Those of the panels, 0 to 1.
 
     Attributes
     ----------
@@ -278,14 +280,14 @@ class Places:
         From the front, and from behind.
     """
 
-    def __init__(self, made: Made):
+    def __init__(self, made: Made, colours: Array | None = None):
         self._stages = [Stage(made, view) for view in sides(made.panels)]
         count = len(made.panels)
         seen = []
         self.pictures = []
         for stage in self._stages:
             stage.add(range(count))
-            self.pictures.append(stage.picture(pale_colours(count)))
+            self.pictures.append(stage.picture(pale_colours(count) if colours is None else colours))
             seen.append(np.bincount(stage.owner.ravel() + 1, minlength=count + 1)[1:])
         self._best = np.argmax(seen, axis=0)
 

@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from html import escape
 
+import numpy as np
+
+from gso.mesh.view import pale_colours
 from gso.typing import Array, Json
 from gso.workshop.assembly_view import Picture, Places, here
 from gso.workshop.joining import StepPicture, in_words, step_pictures
@@ -38,7 +41,10 @@ class Views:
     @cached_property
     def places(self) -> list[Places]:
         """Pictures of the first designs."""
-        return [Places(one.made) for one in self.shown[:_PICTURED]]
+        last = np.cumsum([len(one.panels) for one in self.shown])
+        colours = np.split(pale_colours(int(last[-1]) if len(last) else 0), last[:-1])
+        every = zip(self.shown[:_PICTURED], colours, strict=False)
+        return [Places(one.made, own) for one, own in every]
 
     @cached_property
     def steps(self) -> list[list[StepPicture]]:

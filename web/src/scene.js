@@ -66,6 +66,7 @@ export class Stage {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", () => this.ask());
+    this.controls.addEventListener("start", () => (this.touched = true));
     this.listeners = { frame: [], rest: [] };
     this.share = 1;
     this.explosion = 0;
@@ -200,6 +201,7 @@ export class Stage {
   // The view of the pictures: axes are columns right, up, towards the viewer.
   look() {
     const axes = this.data.view;
+    this.touched = false;
     const { middle, size } = this.around;
     const toward = new Vector3(...axes.map((row) => row[2]));
     const steep = Math.abs(toward.z) > 0.999;
@@ -241,6 +243,12 @@ export class Stage {
     this.ask();
   }
 
+  // A view that nobody has turned fits its window again.
+  fit() {
+    if (this.touched) this.resize();
+    else this.look();
+  }
+
   // Draw all pixels, or fewer of them while something moves on slow machines.
   sharpen(on) {
     const ratio = Math.min(window.devicePixelRatio, 2);
@@ -252,6 +260,7 @@ export class Stage {
   }
 
   turn(right, up) {
+    this.touched = true;
     const offset = this.camera.position.clone().sub(this.controls.target);
     const size = offset.length();
     const azimuth = Math.atan2(offset.y, offset.x) - right;
@@ -263,6 +272,7 @@ export class Stage {
   }
 
   zoom(factor) {
+    this.touched = true;
     const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();

@@ -52,7 +52,7 @@ export class Viewer {
     this.keys();
     this.stage.listeners.frame.push(() => this.label());
     this.stage.listeners.rest.push(() => this.settle());
-    new ResizeObserver(() => this.stage.resize()).observe(this.space.parentElement);
+    new ResizeObserver(() => this.stage.fit()).observe(this.space.parentElement);
     const theme = () => {
       this.names.clear();
       this.stage.paint(getComputedStyle(document.documentElement));
