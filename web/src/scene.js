@@ -227,7 +227,7 @@ export class Stage {
       const own = [0, 0, 0];
       for (let i = 0; i < 3; i++) for (let j = 0; j < 3; j++) own[j] += axes[i][j] * (this.points[v + i] - centre[i]);
       const across = Math.max(Math.abs(own[1]), Math.abs(own[0]) / this.camera.aspect);
-      far = Math.max(far, own[2] + (1.08 * across) / slope);
+      far = Math.max(far, own[2] + (1.12 * across) / slope);
     }
     return far || 1;
   }
