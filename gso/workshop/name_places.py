@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,20 +71,21 @@ def _between(
 
     lines = shapely.MultiLineString([bend.line for bend in part.bends])
     free = shapely.get_parts(without(shape, lines.buffer(_BESIDE * _LEAST * height)))
-    free = free[shapely.get_type_id(free) == 3]
+    least = (_LEAST * height) ** 2 * _LETTER * max(len(text), 1)
+    free = free[(shapely.get_type_id(free) == 3) & (shapely.area(free) >= least)]
     free = free[np.argsort(shapely.distance(free, shapely.Point(near)), kind="stable")][:_CELLS]
+    ways = [_readable(rectangle(np.asarray(cell.exterior.coords)[:-1])[0]) for cell in free]
+    middles = [(shapely.get_coordinates(cell.centroid)[0], roomiest(cell)[0]) for cell in free]
     for share in _STEPS:
         box = share * height * np.array([_LETTER * max(len(text), 1), 1.0])
-        for cell in free:
+        for cell, way, own in zip(free, ways, middles, strict=True):
             if cell.area < box.prod():
                 continue
-            way = _readable(rectangle(np.asarray(cell.exterior.coords)[:-1])[0])
-            for middle in (shapely.get_coordinates(cell.centroid)[0], roomiest(cell)[0]):
-                for angle in (0.0, way):
-                    c, s = np.cos(angle), np.sin(angle)
-                    corners = middle + box * _CORNERS @ np.array([[c, s], [-s, c]])
-                    if cell.contains(shapely.Polygon(corners)):
-                        return middle, share * height, angle
+            for middle, angle in product(own, (0.0, way)):
+                c, s = np.cos(angle), np.sin(angle)
+                corners = middle + box * _CORNERS @ np.array([[c, s], [-s, c]])
+                if cell.contains(shapely.Polygon(corners)):
+                    return middle, share * height, angle
     return None
 
 
