@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,13 +74,13 @@ def _between(
     free = free[(shapely.get_type_id(free) == 3) & (shapely.area(free) >= least)]
     free = free[np.argsort(shapely.distance(free, shapely.Point(near)), kind="stable")][:_CELLS]
     ways = [_readable(rectangle(np.asarray(cell.exterior.coords)[:-1])[0]) for cell in free]
-    middles = [(shapely.get_coordinates(cell.centroid)[0], roomiest(cell)[0]) for cell in free]
+    middles = shapely.get_coordinates(shapely.centroid(free))
     for share in _STEPS:
         box = share * height * np.array([_LETTER * max(len(text), 1), 1.0])
-        for cell, way, own in zip(free, ways, middles, strict=True):
+        for cell, way, middle in zip(free, ways, middles, strict=True):
             if cell.area < box.prod():
                 continue
-            for middle, angle in product(own, (0.0, way)):
+            for angle in (0.0, way):
                 c, s = np.cos(angle), np.sin(angle)
                 corners = middle + box * _CORNERS @ np.array([[c, s], [-s, c]])
                 if cell.contains(shapely.Polygon(corners)):
