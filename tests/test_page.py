@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import gso
+from gso.cli import main
 from gso.mesh import Mesh
 from gso.workshop import (
     Drawing,
@@ -309,6 +311,23 @@ class TestPage:
         for name, own in said["files"].items():
             assert hashlib.sha256((out / name).read_bytes()).hexdigest() == own
         assert "three.js authors" in (out / "LICENSE-three.txt").read_text()
+
+
+def test_a_result_has_a_page(tmp_path):
+    y, turn = np.mgrid[:9, :9] / 8
+    arch = np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
+    file, out = tmp_path / "arch.npz", tmp_path / "arch.html"
+    gso.tno.optimize(arch).save(file)
+    words = ["view", str(file), "-o", str(out), "--unit", "m"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    data = json.loads(read(out.read_text(), "page-data"))
+    (part,) = data["parts"]
+    assert sorted([part["length"], part["width"]]) == pytest.approx([1000, 1000], rel=0.01)
+    denoised = gso.tno.optimize(arch, task="denoise")
+    denoised.save(tmp_path / "flat.npz")
+    done = CliRunner().invoke(main, ["view", str(tmp_path / "flat.npz"), "-o", str(out)])
+    assert done.exit_code == 1 and "there is no pattern" in done.output
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from gso.cli.pieces_command import pieces
 from gso.cli.strips_command import strips
 from gso.cli.train import train
 from gso.cli.unfold_command import unfold
+from gso.cli.view_command import view
 from gso.errors import GSOError
 
 __all__ = ["main"]
@@ -67,5 +68,17 @@ def main() -> None:
     """
 
 
-for _command in (optimize, strips, pieces, unfold, metrics, info, plot, dataset, fabricate, train):
+for _command in (
+    optimize,
+    strips,
+    pieces,
+    unfold,
+    metrics,
+    info,
+    plot,
+    view,
+    dataset,
+    fabricate,
+    train,
+):
     main.add_command(_command)
