@@ -7,8 +7,8 @@ drawn where Chromium is installed.
 
 from __future__ import annotations
 
+import io
 import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -68,12 +68,21 @@ def workshop() -> None:
         name = max(job.parts, key=lambda part: len(part.bends)).name
         shutil.copy(Path(folder) / "parts" / f"{name}.svg", IMAGES / "part.svg")
         shutil.copy(Path(folder) / "sheets" / "sheet-1.svg", IMAGES / "sheet.svg")
-        program = shutil.which("chromium") or shutil.which("google-chrome")
-        if program is not None:
-            page = Path(folder) / "page.png"
-            words = ["--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=1100,1250"]
-            place = (Path(folder) / "index.html").as_uri()
-            subprocess.run([program, *words, f"--screenshot={page}", place], check=True)
+        sys.path.insert(0, str(ROOT))
+        from tests.browser import PROGRAM, Browser
+
+        if PROGRAM is not None:
+            with Browser(1200, 980) as browser:
+                browser.open(Path(folder) / "index.html")
+                browser.run(
+                    "(() => { const one = gsoPage.viewer.form.elements.explode; one.value = 0.25;"
+                    "one.dispatchEvent(new Event('input')); })()"
+                )
+                browser.run("gsoPage.choosePart(1)")
+                browser.wait("gsoPage.viewer.stage.isSharp && !gsoPage.viewer.stage.asked")
+                # The names are written once nothing moves.
+                browser.run("new Promise((done) => setTimeout(done, 1000))")
+                page = io.BytesIO(browser.picture())
             reduce("page", Image.open(page).convert("RGB"))
 
 

@@ -12,7 +12,7 @@ from gso.workshop import (
     GuideLine,
     Panel,
     Part,
-    assembly,
+    Places,
     guide_lines,
     of_surface,
     united,
@@ -104,8 +104,9 @@ def test_the_page_shows_parts_in_their_places(tmp_path):
     done = gso.fabricate(design, tmp_path, max_deviation="0.5%")
     assert len(done.parts) > 1
     page = (tmp_path / "index.html").read_text()
-    assert page.count("data:image/png;base64,") == 2
-    links = set(re.findall(r'href="#([^"]+)"', page))
+    # From both sides, and a picture of each step of joining.
+    assert page.count("data:image/png;base64,") == 2 + len(done.parts)
+    links = set(re.findall(r'<a [^>]*href="#([^"]+)"', page))
     places = set(re.findall(r'<figure id="([^"]+)"', page))
     assert links == places
     assert len(places) == len(done.parts)
@@ -120,8 +121,7 @@ def test_hidden_lines_are_not_drawn():
     flat = points[:, :2].copy()
     flat[4:] += [5.0, 0.0]
     made = of_surface("two", mesh, gso.Pattern(flat, mesh.faces, np.arange(8)), {})
-    above, below = assembly(made, lambda name: f"#{name}")
-    pictures = above, below
+    pictures = [picture.svg(lambda name: f"#{name}") for picture in Places(made).pictures]
     assert [len(re.findall("<title", picture)) for picture in pictures] == [1, 2]
     rims = [re.search('<path class="rim" d="([^"]*)"', picture)[1] for picture in pictures]
     # Eight edges are seen from below, and four from above.

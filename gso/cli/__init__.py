@@ -15,6 +15,7 @@ from gso.cli.pieces_command import pieces
 from gso.cli.strips_command import strips
 from gso.cli.train import train
 from gso.cli.unfold_command import unfold
+from gso.cli.view_command import view
 from gso.errors import GSOError
 
 __all__ = ["TABLE", "main"]
@@ -74,6 +75,6 @@ def main(ctx: click.Context) -> None:
         click.echo(f"{overview()}\n\ngso COMMAND --help says more; gso --help lists all commands.")
 
 
-_SURFACES = (optimize, strips, pieces, unfold, loft, fabricate, metrics, info, plot)
+_SURFACES = (optimize, strips, pieces, unfold, loft, fabricate, metrics, info, plot, view)
 for _command in (*_SURFACES, dataset, train, completion):
     main.add_command(_command)

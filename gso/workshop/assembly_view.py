@@ -5,28 +5,265 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from xml.etree.ElementTree import SubElement, tostring
 
 import numpy as np
 
 from gso import geometry
+from gso.geometry.polygon import arc_lengths
 from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.mesh.view import GRAZING, View, lit, pale_colours
-from gso.typing import Array
-from gso.workshop.panels import Made
+from gso.typing import Array, Flags, Ints
+from gso.workshop.panels import Made, Mating, Panel
 
-#: Size of a picture, its margin and the height of its texts, in pixels; pixels of the image of
-#: the faces per pixel; points of a line at which it is looked for behind others, and their
-#: distance from faces.
-_SIZE, _MARGIN, _TALL, _FINE, _POINTS, _NEAR = 470, 12, 14, 2, 9, 3.0
+#: Size of a picture and the height of its capital letters, in pixels.
+SIZE, TALL = 470, 10.0
+#: Margin in pixels; pixels of the image of the faces per pixel; points of a line at which it is
+#: looked for behind others, and their distance from faces.
+_MARGIN, _FINE, _POINTS, _NEAR = 12, 2, 9, 3.0
 #: Lowest brightness.
 _DARK = 0.45
+#: Degrees of brightness of pictures with few of them.
+_DEGREES = 24
+#: Least distance between the numbers of seams and other texts, in pixels.
+_APART = 12.0
+#: Colour of outlines in the image of the faces.
+_EDGE = (110, 110, 108)
 
 
-def assembly(made: Made, link: Callable[[str], str]) -> list[str]:
-    """Draw the panels of a design from two opposite sides.
+@dataclass(frozen=True, eq=False)
+class Name:
+    """A text of a picture: what a panel or a seam is called.
+
+    Attributes
+    ----------
+    text : str
+    at : ndarray, (2,)
+        The middle of its base line.
+    title : str
+        The whole name.
+    kind : {"panel", "seam"}
+    """
+
+    text: str
+    at: Array
+    title: str
+    kind: str = "panel"
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture of panels in their places, in pixels with y up.
+
+    Attributes
+    ----------
+    size : (float, float)
+        Width and height.
+    image : ndarray of uint8, (rows, columns, 3)
+        The faces; the first row is the upper one.
+    lines : dict of ndarray (k, 2, 2)
+        Lines that are seen, by their kind: "bends", "rim", "joined" (seams).
+    names : tuple of Name
+    """
+
+    size: tuple[float, float]
+    image: np.ndarray
+    lines: dict[str, Array]
+    names: tuple[Name, ...] = ()
+
+    def svg(self, link: Callable[[str], str] = lambda title: "", name: str = "") -> str:
+        """Return it as an SVG element.
+
+        `link` gives the addresses of names, empty for none; `name` is the identifier of the group
+        of all but the names, which other pictures may repeat.
+        """
+        page = SVGPage(np.zeros(2), np.array(self.size), digits=4)
+        width, height = (f"{side:.5g}" for side in self.size)
+        for unused in ("width", "height"):
+            del page.root.attrib[unused]
+        page.root.attrib |= {"class": "picture", "style": f"--w:{self.size[0]:.0f}"}
+        source = f"data:image/png;base64,{base64.b64encode(self.png()).decode()}"
+        faces = SubElement(page.root, "g", {"id": name} if name else {})
+        SubElement(faces, "image", {"href": source, "width": width, "height": height})
+        for kind, lines in self.lines.items():
+            page.path(faces, lines, kind=kind)
+        for own in self.names:
+            address = link(own.title)
+            target = SubElement(page.root, "a", {"href": address} if address else {})
+            target.set("class", f"{own.kind}-name")
+            SubElement(target, "title").text = own.title
+            page.text(target, own.text, own.at, TALL)
+        return tostring(page.root, "unicode")
+
+    def png(self) -> bytes:
+        """Return the image of the faces as a PNG file."""
+        return _png(self.image)
+
+
+class Stage:
+    """The panels of a design in one view, put on one after another.
+
+    Parameters
+    ----------
+    made : Made
+    view : View
+    size : float
+        The larger side of its pictures, without margins, in pixels.
+    """
+
+    def __init__(self, made: Made, view: View, size: float = SIZE):
+        self._made = made
+        meshes = [panel.surface for panel in made.panels]
+        points = [view.project(mesh.vertices) for mesh in meshes]
+        every = np.concatenate(points)
+        low, extent = every[:, :2].min(axis=0), np.ptp(every[:, :2], axis=0)
+        self._scale = size / float(extent.max())
+        self._view, self._low = view, low
+        wide, high = (self._scale * extent + 2 * _MARGIN).tolist()
+        self.size = wide, high
+        # Pixels of the picture, y up; the image has its first row above.
+        self._placed = [self._pixels(p) for p in points]
+        turned = [self._turned(p) for p in self._placed]
+        self._turned_points = turned
+        self._corners = [p[m.triangles] for p, m in zip(turned, meshes, strict=True)]
+        self._first = np.cumsum([0, *(len(own) for own in self._corners)])
+        self._owner = np.repeat(np.arange(len(meshes)), [len(own) for own in self._corners])
+        shape = (int(np.ceil(_FINE * high)), int(np.ceil(_FINE * wide)))
+        self._triangle = np.full(shape, -1)
+        self._depth = np.full(shape, -np.inf)
+        self._shown: list[int] = []
+
+    def _pixels(self, points: Array) -> Array:
+        placed: Array = self._scale * (points - [*self._low, 0.0]) + [_MARGIN, _MARGIN, 0.0]
+        return placed
+
+    def _turned(self, placed: Array) -> Array:
+        turned: Array = _FINE * (placed * [1.0, -1.0, 1.0] + [0.0, self.size[1], 0.0])
+        return turned
+
+    def add(self, panels: Iterable[int]) -> None:
+        """Put panels on, by their numbers."""
+        panels = list(panels)
+        corners = np.concatenate([np.empty((0, 3, 3)), *(self._corners[k] for k in panels)])
+        number = np.concatenate(
+            [np.empty(0, np.int64), *(np.arange(*self._first[k : k + 2]) for k in panels)]
+        )
+        if not len(corners):
+            return
+        triangle, depth = geometry.nearest_triangles(corners, self._depth.shape)
+        nearer = depth > self._depth
+        self._depth[nearer] = depth[nearer]
+        self._triangle[nearer] = number[triangle[nearer]]
+        self._shown += panels
+
+    @property
+    def owner(self) -> Ints:
+        """The panel that is seen in each pixel of the image, -1 for none."""
+        return np.where(self._triangle >= 0, self._owner[self._triangle], -1)
+
+    def picture(
+        self,
+        colours: Array,
+        *,
+        new: Sequence[int] | None = None,
+        seams: Sequence[Mating] = (),
+    ) -> Picture:
+        """Draw what was put on.
+
+        Parameters
+        ----------
+        colours : ndarray, (p, 3)
+            Of all panels, 0 to 1.
+        new : sequence of int, optional
+            Panels whose names and lines are drawn; others have their outlines in the image of
+            the faces only. By default all.
+        seams : sequence of Mating
+            Seams that are drawn in front of everything, with their numbers where these do not lie
+            on each other.
+        """
+        shown = self._triangle >= 0
+        image = np.full((*self._depth.shape, 3), 255, np.uint8)
+        seen = self._triangle[shown]
+        tones = np.zeros((len(self._owner), 3), np.uint8)
+        used = np.unique(seen)
+        corners = np.concatenate(self._corners)[used]
+        tones[used] = _tones(corners, colours[self._owner[used]], new is None)
+        image[shown] = tones[seen]
+        panels, owner = self._made.panels, self.owner
+        drawn_panels = self._shown if new is None else list(new)
+        if new is not None:
+            image[_borders(owner)] = _EDGE
+        lines = {
+            kind: self._seen(drawn_panels, [getattr(panels[k], kind) for k in drawn_panels])
+            for kind in ("bends", "rim")
+        }
+        names = []
+        for number, middle in _roomiest(owner, drawn_panels).items():
+            column, row = middle / _FINE
+            at = np.array([column, self.size[1] - row - 0.5 * TALL])
+            title = panels[number].name
+            names.append(Name(short(title, self._made.name), at, title))
+        if seams:
+            drawn = [self._seam(seam) for seam in seams]
+            lines["joined"] = np.concatenate(
+                [np.stack([line[:-1], line[1:]], axis=1) for line in drawn]
+            )
+            for seam, line in zip(seams, drawn, strict=True):
+                at = _middle(line) - [0.0, 0.5 * TALL]
+                if all(np.abs(at - name.at).max() > _APART for name in names):
+                    names.append(Name(str(seam.number), at, f"seam {seam.number}", "seam"))
+        return Picture(self.size, image, lines, tuple(names))
+
+    def shadow(self, panel: int) -> list[Array]:
+        """Return the outlines (k, 2) of what a panel covers, whether it is seen or not."""
+        import shapely
+
+        own = self._made.panels[panel]
+        corners = self._placed[panel][own.surface.triangles, :2]
+        if not np.ptp(np.sign(_areas(corners))):
+            # Nothing is folded over: the outline is that of the panel.
+            return [self._placed[panel][loop, :2] for loop in own.loops]
+        # Rounding to a tenth of a pixel closes gaps between triangles.
+        whole = shapely.union_all(shapely.polygons(corners), grid_size=0.1)
+        shapes = shapely.get_parts(shapely.simplify(whole, 0.3))
+        rings = shapely.get_rings(shapes[shapely.get_type_id(shapes) == 3])
+        return [shapely.get_coordinates(ring)[:-1] for ring in rings]
+
+    def _seam(self, seam: Mating) -> Array:
+        points = seam.one.on(self._made.panels[seam.one.panel].surface.vertices)
+        return self._pixels(self._view.project(points))[:, :2]
+
+    def _seen(self, panels: Sequence[int], edges: Sequence[Ints]) -> Array:
+        """Return what is seen of edges of each panel, (k, 2, 2)."""
+        drawn = [
+            _seen_parts(self._placed[k][ends], self._turned_points[k][ends], self._depth)
+            for k, ends in zip(panels, edges, strict=True)
+        ]
+        return np.concatenate([np.empty((0, 2, 2)), *drawn])
+
+
+def here(picture: Picture, name: str, loops: Sequence[Array]) -> str:
+    """Draw the place of a panel, by outlines (k, 2), on a picture with an identifier."""
+    page = SVGPage(np.zeros(2), np.array(picture.size), digits=4)
+    for unused in ("width", "height"):
+        del page.root.attrib[unused]
+    page.root.set("class", "place")
+    SubElement(page.root, "use", {"href": f"#{name}"})
+    page.path(page.root, loops, closed=True, kind="here")
+    return tostring(page.root, "unicode")
+
+
+def sides(panels: Sequence[Panel]) -> tuple[View, View]:
+    """Return the views of panels from the front and from behind."""
+    front = View.of(_joined([panel.surface for panel in panels]))
+    return front, front.behind
+
+
+class Places:
+    """Pictures of a design's panels in their places, from two opposite sides.
 
     Panels have colours of their own, and their names where they are seen. Thin lines are bends,
     thick ones are outlines.
@@ -34,16 +271,33 @@ def assembly(made: Made, link: Callable[[str], str]) -> list[str]:
     Parameters
     ----------
     made : Made
-    link : callable
-        Gives the address of what is shown when a panel's name is clicked; empty for none.
+    colours : ndarray, (p, 3), optional
+        Those of the panels, 0 to 1.
 
-    Returns
-    -------
-    list of str
-        SVG elements.
+    Attributes
+    ----------
+    pictures : list of Picture
+        From the front, and from behind.
     """
-    front = View.of(_joined([panel.surface for panel in made.panels]))
-    return [_drawn(view, made, link) for view in (front, front.behind)]
+
+    def __init__(self, made: Made, colours: Array | None = None):
+        self._stages = [Stage(made, view) for view in sides(made.panels)]
+        count = len(made.panels)
+        seen = []
+        self.pictures = []
+        for stage in self._stages:
+            stage.add(range(count))
+            self.pictures.append(stage.picture(pale_colours(count) if colours is None else colours))
+            seen.append(np.bincount(stage.owner.ravel() + 1, minlength=count + 1)[1:])
+        self._best = np.argmax(seen, axis=0)
+
+    def side(self, panel: int) -> int:
+        """Return the number of the picture in which most of a panel is seen."""
+        return int(self._best[panel])
+
+    def shadow(self, side: int, panel: int) -> list[Array]:
+        """Return the outlines (k, 2) of what a panel covers in a picture."""
+        return self._stages[side].shadow(panel)
 
 
 def _joined(meshes: Sequence[Mesh]) -> Mesh:
@@ -53,51 +307,41 @@ def _joined(meshes: Sequence[Mesh]) -> Mesh:
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
 
 
-def _drawn(view: View, made: Made, link: Callable[[str], str]) -> str:
-    """Draw the panels in a view: faces as an image, what is seen of lines, and names."""
-    meshes = [panel.surface for panel in made.panels]
-    points = [view.project(mesh.vertices) for mesh in meshes]
-    every = np.concatenate(points)
-    low, size = every[:, :2].min(axis=0), np.ptp(every[:, :2], axis=0)
-    scale = _SIZE / float(size.max())
-    high = scale * size + 2 * _MARGIN
-    # Pixels of the picture, y up; the image has its first row above.
-    placed = [scale * (p - [*low, 0.0]) + [_MARGIN, _MARGIN, 0.0] for p in points]
-    turned = [_FINE * (p * [1.0, -1.0, 1.0] + [0.0, high[1], 0.0]) for p in placed]
-    corners = np.concatenate([p[m.triangles] for p, m in zip(turned, meshes, strict=True)])
-    owner = np.repeat(np.arange(len(meshes)), [len(mesh.triangles) for mesh in meshes])
-    wide, tall = (int(np.ceil(_FINE * side)) for side in high)
-    triangle, depth = geometry.nearest_triangles(corners, (tall, wide))
-    image = np.full((tall, wide, 3), 255, np.uint8)
-    shown = triangle >= 0
-    image[shown] = _tones(corners, pale_colours(len(meshes))[owner])[triangle[shown]]
-
-    page = SVGPage(np.zeros(2), high, digits=5)
-    width, height = (f"{side:.5g}" for side in high)
-    page.root.attrib |= {"width": width, "height": height}
-    source = f"data:image/png;base64,{base64.b64encode(_png(image)).decode()}"
-    SubElement(page.root, "image", {"href": source, "width": width, "height": height})
-    bends, rims = ([getattr(panel, name) for panel in made.panels] for name in ("bends", "rim"))
-    for kind, edges in (("bend", bends), ("rim", rims)):
-        drawn = [
-            _seen_parts(own[ends], turn[ends], depth)
-            for ends, own, turn in zip(edges, placed, turned, strict=True)
-        ]
-        page.path(page.root, np.concatenate(drawn), kind=kind)
-    for number, middle in geometry.roomiest_pixels(np.where(shown, owner[triangle], -1)).items():
-        name, (column, row) = made.panels[number].name, middle / _FINE
-        address = link(name)
-        target = SubElement(page.root, "a", {"href": address} if address else {})
-        SubElement(target, "title").text = name
-        at = np.array([column, high[1] - row - 0.36 * _TALL])
-        page.text(target, _short(name, made.name), at, 0.72 * _TALL)
-    return tostring(page.root, "unicode")
+def _areas(corners: Array) -> Array:
+    """Return twice the signed areas of triangles (m, 3, 2)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def _short(name: str, design: str) -> str:
+def _borders(owner: Ints) -> Flags:
+    """Tell which pixels have a neighbour of another panel, or of none, below or to the right."""
+    out = np.zeros(owner.shape, bool)
+    out[:-1] |= owner[:-1] != owner[1:]
+    out[:, :-1] |= owner[:, :-1] != owner[:, 1:]
+    return out
+
+
+def _roomiest(owner: Ints, panels: Sequence[int]) -> dict[int, Array]:
+    """Return the pixel (column, row) with most room for a name on each panel that is seen."""
+    own = np.where(np.isin(owner, panels), owner, -1)
+    rows, columns = (np.flatnonzero((own >= 0).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return {}
+    low = np.array([columns[0], rows[0]])
+    part = own[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return {k: middle + low for k, middle in geometry.roomiest_pixels(part).items()}
+
+
+def _middle(line: Array) -> Array:
+    """Return the point half-way along a line (k, 2)."""
+    along = arc_lengths(line)
+    return np.array([np.interp(0.5 * along[-1], along, x) for x in line.T])
+
+
+def short(name: str, design: str) -> str:
     """Return a name without the design's.
 
-    >>> _short("roof-A-1", "roof"), _short("roof", "roof")
+    >>> short("roof-A-1", "roof"), short("roof", "roof")
     ('A-1', 'roof')
     """
     return name.removeprefix(f"{design}-") or name
@@ -117,11 +361,16 @@ def _seen_parts(lines: Array, turned: Array, depth: Array) -> Array:
     return np.concatenate([lines[whole][..., :2], steps[kept]])
 
 
-def _tones(corners: Array, colours: Array) -> np.ndarray:
-    """Return the colours of triangles, the same for both orientations, (m, 3)."""
+def _tones(corners: Array, colours: Array, fine: bool = True) -> np.ndarray:
+    """Return the colours of triangles, the same for both orientations, (m, 3).
+
+    With `fine` false there are few degrees of brightness.
+    """
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # Rows of the image count downwards.
-    bright = _DARK + (1.0 - _DARK) * lit(normal * [1.0, -1.0, 1.0], GRAZING)
+    light = lit(normal * [1.0, -1.0, 1.0], GRAZING)
+    light = light if fine else (_DEGREES * light).round() / _DEGREES
+    bright = _DARK + (1.0 - _DARK) * light
     return np.asarray(np.round(255.0 * colours * bright[:, None]).astype(np.uint8))
 
 
@@ -133,8 +382,18 @@ def _png(image: np.ndarray) -> bytes:
         return struct.pack(">I", len(data)) + name + data + check
 
     rows, columns = image.shape[:2]
+    code = image.astype(np.int64) @ [1 << 16, 1 << 8, 1]
+    colours, index = np.unique(code, return_inverse=True)
+    few = len(colours) <= 256
     # Each row begins with the number of its filter, 0 for none.
-    lines = np.pad(image.reshape(rows, -1), ((0, 0), (1, 0))).tobytes()
-    head = struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0)
-    parts = [(b"IHDR", head), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
+    pixels = index.reshape(rows, columns).astype(np.uint8) if few else image.reshape(rows, -1)
+    lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
+    parts = [(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 3 if few else 2, 0, 0, 0))]
+    # White, the last of the sorted colours, is transparent: what has no face shows the page.
+    if few:
+        parts.append((b"PLTE", b"".join(int(c).to_bytes(3, "big") for c in colours)))
+        parts.append((b"tRNS", b"\xff" * (len(colours) - 1) + b"\x00"))
+    else:
+        parts.append((b"tRNS", b"\x00\xff" * 3))
+    parts += [(b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)

@@ -43,6 +43,7 @@ from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
 from gso.workshop.output_files import Drawings, written
+from gso.workshop.page_data import Shown
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.part_notes import guide_notes, outline_notes, seam_notes, strip_notes
@@ -323,6 +324,7 @@ def fabricate(
     of_sheet: dict[float | None, list[Part]] = {}
     solids: list[Solid] = []
     records: list[Json] = []
+    shown: list[Shown] = []
     reasons: list[Reason] = []
     notes = [note for design in every for note in design.notes]
     for k in chosen:
@@ -338,6 +340,8 @@ def fabricate(
         thick = every[k].sheet
         asked = finish if thick is None else finish.of_solid(per_unit * thick)
         fit = fitted(one, per_unit, asked, *lines)
+        alike = tuple(design.mesh for design in same_as)
+        shown.append(Shown(one, every[k].mesh, per_unit, fit.panels, alike))
         if step and asked.thickness is not None:
             solids += folded_solids(one.panels, per_unit, asked.thickness)
         cut_out, bare = parts_from(fit, asked)
@@ -424,7 +428,7 @@ def fabricate(
     certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
-    files = written(place, parts, sheets, found.values(), certificate, drawings, earlier, solids)
+    files = written(place, parts, sheets, shown, certificate, drawings, earlier, solids)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gso import io
 from gso.io.atomic import write_bytes
 from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER, SOLIDS
-from gso.workshop.page import page
-from gso.workshop.panels import Made
+from gso.workshop.page import page_html
+from gso.workshop.page_data import Shown
+from gso.workshop.page_views import Views
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import layer_set
@@ -69,7 +71,7 @@ def written(
     place: Path,
     parts: Sequence[Part],
     sheets: Sequence[Drawing],
-    found: Collection[Made],
+    shown: Sequence[Shown],
     certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
@@ -78,9 +80,11 @@ def written(
     """Write all files but the certificate; delete earlier ones that are not written again."""
     files: list[str] = []
 
-    def write(drawing: Drawing, name: str, suffix: str) -> None:
+    views = Views(shown, certificate)
+
+    def write(drawing: Drawing, name: str, suffix: str, **more: Any) -> None:
         (place / name).parent.mkdir(exist_ok=True)
-        writers.write(drawing, place / name, **drawings.options(suffix))
+        writers.write(drawing, place / name, **drawings.options(suffix), **more)
         files.append(name)
 
     for suffix in drawings.formats:
@@ -90,9 +94,11 @@ def written(
         for number, drawing in enumerate(sheets, start=1):
             write(drawing, f"sheets/sheet-{number}.{suffix}", suffix)
     if drawings.paper is not None and parts:
-        write(beside(parts), PAPER, "pdf")
-    for one in found:
-        for panel in one.panels:
+        found = {part.name: views.place(part.name) for part in parts}
+        at = {name: (one[0], one[2]) for name, one in found.items() if one is not None}
+        write(beside(parts), PAPER, "pdf", places=at, steps=views.step_texts())
+    for one in shown:
+        for panel in one.made.panels:
             name = f"surfaces/{panel.name}.obj"
             (place / name).parent.mkdir(exist_ok=True)
             io.write(panel.surface, place / name)
@@ -100,7 +106,7 @@ def written(
     if solids:
         io.save_solids(solids, place / SOLIDS)
         files.append(SOLIDS)
-    write_bytes(place / PAGE, page(certificate, parts, sheets, found).encode())
+    write_bytes(place / PAGE, page_html(certificate, parts, sheets, views).encode())
     files += [PAGE, CERTIFICATE]
     for name in earlier - set(files):
         (place / name).unlink(missing_ok=True)

@@ -14,6 +14,7 @@ from gso.typing import Array
 from gso.verdict import Reason
 from gso.workshop.finish import Finish
 from gso.workshop.marks import cut, marked
+from gso.workshop.name_places import name_place
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
 from gso.workshop.part import Label, Notch, Part
@@ -328,16 +329,14 @@ def _registered(
 
 
 def _name(part: Part, height: float) -> tuple[Label, ...]:
-    """Place the name where there is most room, no larger than fits; below it what it is made of."""
-    middle, room = roomiest(region(part.outline, part.holes))
-
-    def label(text: str, below: float, most: float) -> Label:
-        # A letter is about 0.7 of its height wide.
-        high = min(most, 2.0 * room / max(0.7 * len(text), 1.0))
-        return Label(text, middle - [0.0, below], high)
-
-    if not room > 0:
+    """Place the name, no larger than fits; below it what the part is made of."""
+    middle, high, angle = name_place(part, part.name, height)
+    if not high > 0:
         return ()
-    name = label(part.name, 0.0, height)
-    said = (label(part.made_of, name.height, 0.5 * name.height),) if part.faces else ()
-    return (name, *said)
+    name = Label(part.name, middle, high, angle)
+    if not part.faces:
+        return (name,)
+    room = roomiest(region(part.outline, part.holes))[1]
+    low = min(0.5 * high, 2.0 * room / max(0.7 * len(part.made_of), 1.0))
+    down = np.array([np.sin(angle), -np.cos(angle)])
+    return (name, Label(part.made_of, middle + high * down, low, angle))

@@ -122,6 +122,18 @@ def roomiest(shape: Geometry) -> tuple[Array, float]:
     return middle, float(np.linalg.norm(rim - middle))
 
 
+def is_clear(outline: Array, low: Array, high: Array) -> bool:
+    """Tell whether a rectangle between two corners lies outside a polygon (k, 2).
+
+    >>> square = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
+    >>> [is_clear(square, np.array([x, 0.0]), np.array([x + 1, 1.0])) for x in (1.0, 3.5, 5.0)]
+    [False, False, True]
+    """
+    import shapely
+
+    return bool(region(outline).disjoint(shapely.box(*low, *high)))
+
+
 def neck(shape: Geometry, least: float) -> float:
     """Return the width of a shape at its narrowest neck if it is less than `least`, else `least`.
 

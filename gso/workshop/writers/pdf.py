@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,9 @@ from gso.errors import OptionError
 from gso.quantities import as_positive
 from gso.spelling import choices
 from gso.typing import Array
-from gso.workshop.part import Drawing
+from gso.workshop.assembly_view import TALL, Picture
+from gso.workshop.part import Drawing, Part
+from gso.workshop.polygons import is_clear
 from gso.workshop.writers import strokes
 from gso.workshop.writers.layers import Layer
 from gso.workshop.writers.tiles import FOOT, Tile, Tiling, tiled
@@ -40,6 +43,13 @@ _POINT, _LINE = 72.0 / 25.4, 0.25
 _CAPITAL = 0.718
 # Lengths of the scale bar, and height of the texts at the foot of a page.
 _BARS, _TEXT = (100.0, 50.0), 3.0
+# Sizes of the picture of a part's place, in millimetres: the first for which there is room.
+_PLACES = (36.0, 26.0, 18.0)
+# Steps of joining on a page, and in a row.
+_EACH, _ROW = 6, 2
+# Colours of lines of pictures, their widths in millimetres, and that of the part in its place.
+_PICTURED = {"bends": ("#000000", 0.08), "rim": ("#000000", 0.2), "joined": ("#d4007a", 0.5)}
+_HERE = "#f08a1c"
 # Size of the crosses at the corners of a window.
 _CROSS = 4.0
 
@@ -52,6 +62,8 @@ def content(
     overlap: float = 10.0,
     margin: float = _MARGIN,
     bend_text: bool = False,
+    places: Mapping[str, tuple[Picture, Sequence[Array]]] | None = None,
+    steps: Sequence[tuple[str, Picture, Sequence[str]]] = (),
 ) -> bytes:
     """Return parts as a PDF at the scale 1:1, divided into pages.
 
@@ -70,6 +82,12 @@ def content(
         Colours of the lines by kind, from :func:`gso.workshop.writers.layers.layer_set`.
     bend_text : bool
         Also write the direction, angle and radius beside each bend.
+    places : mapping, optional
+        By the name of a part the picture of its design, and outlines (k, 2) of the part in it:
+        drawn small on the page of the part.
+    steps : sequence of (str, Picture, sequence of str)
+        Title, picture and lines of text of the steps in which parts are joined, drawn on pages of
+        their own at the end.
 
     Raises
     ------
@@ -88,12 +106,17 @@ def content(
     gap, free = as_positive(overlap, "overlap", zero=True), as_positive(margin, "margin", zero=True)
     some = [(own, tiled(own, PAPERS[paper], gap, free)) for own in _divided(drawing, paper, free)]
     stream = io.BytesIO()
-    book = _Book(stream, free, gap, sum(len(t.tiles) + (len(t.tiles) > 1) for _, t in some))
+    count = sum(len(t.tiles) + (len(t.tiles) > 1) for _, t in some) + -(-len(steps) // _EACH)
+    book = _Book(stream, free, gap, count)
     for own, tiling in some:
         if len(tiling.tiles) > 1:
             book.overview(own, tiling, layers)
         for tile in tiling.tiles:
             book.tile(own, tiling, tile, layers, bend_text)
+        if len(own.parts) == 1 == len(tiling.tiles) and own.parts[0].name in (places or {}):
+            book.place(own.parts[0], tiling.tiles[0], *(places or {})[own.parts[0].name])
+    for first in range(0, len(steps), _EACH):
+        book.steps(PAPERS[paper], steps[first : first + _EACH])
     book.close()
     return stream.getvalue()
 
@@ -131,6 +154,22 @@ def check_paper(paper: object) -> None:
     """Raise an OptionError if there is no such paper."""
     if not isinstance(paper, str) or paper not in PAPERS:
         raise OptionError(f"no paper {paper!r}; {choices(paper, PAPERS)}")
+
+
+def _wrapped(canvas: Canvas, words: Sequence[str], width: float, size: float) -> list[str]:
+    """Break lines of text at spaces so that each has at most a width, in the canvas' unit."""
+    out = []
+    for text in words:
+        line = ""
+        for word in strokes.printable(text).split():
+            longer = f"{line} {word}".strip()
+            if line and canvas.stringWidth(longer, "Helvetica", size) > width:
+                out.append(line)
+                line = word
+            else:
+                line = longer
+        out.append(line)
+    return out
 
 
 class _Book:
@@ -203,11 +242,99 @@ class _Book:
         self._marks(tiling, wide, high)
         self._foot(drawing, tiling, tile.name)
 
+    def place(self, part: Part, tile: Tile, picture: Picture, loops: Sequence[Array]) -> None:
+        """Draw the place of a part, in a corner of its page that the part leaves free."""
+        shape = np.array(picture.size) / max(picture.size)
+        for size in _PLACES:
+            for share in ((1.0, 1.0), (0.0, 1.0), (1.0, 0.0), (0.0, 0.0)):
+                corner = tile.low + share * (tile.high - tile.low - size * shape)
+                if is_clear(part.outline, corner, corner + size * shape):
+                    at = corner - tile.low + [self._margin, self._margin + FOOT]
+                    self._picture(picture, at, size, names=False)
+                    self._here(picture, at, size, loops)
+                    return
+
+    def steps(
+        self, paper: tuple[float, float], steps: Sequence[tuple[str, Picture, Sequence[str]]]
+    ) -> None:
+        """Draw steps of joining on one page, with what they join."""
+        c = self._begin_page(paper)
+        wide, high = np.array(paper) - 2.0 * self._margin
+        cell = np.array([wide / _ROW, (high - FOOT) / -(-_EACH // _ROW)])
+        for k, (title, picture, words) in enumerate(steps):
+            row, column = divmod(k, _ROW)
+            low = np.array([self._margin, self._margin + FOOT + high - FOOT]) + cell * [
+                column,
+                -row - 1,
+            ]
+            c.setFillGray(0.0)
+            c.setFont("Helvetica-Bold", _TEXT / _CAPITAL)
+            c.drawString(low[0], low[1] + cell[1] - 2.0 * _TEXT, strokes.printable(title))
+            c.setFont("Helvetica", 0.8 * _TEXT / _CAPITAL)
+            said = _wrapped(c, words, cell[0] - 4.0, 0.8 * _TEXT / _CAPITAL)
+            foot = 1.5 * _TEXT * len(said)
+            for number, line in enumerate(said):
+                c.drawString(low[0], low[1] + foot - 1.5 * _TEXT * (number + 1) + 1.0, line)
+            shape = np.array(picture.size) / max(picture.size)
+            size = float(((cell - [6.0, foot + 4.0 * _TEXT]) / shape).min())
+            self._picture(picture, low + np.array([0.0, foot + 2.0]), size)
+        c.setFillGray(0.0)
+        c.setFont("Helvetica", _TEXT / _CAPITAL)
+        said_page = f"order of joining, page {self._page} of {self._pages}"
+        c.drawString(self._margin, self._margin, said_page)
+
+    def _picture(self, picture: Picture, at: Array, size: float, names: bool = True) -> None:
+        """Draw a picture whose larger side has a size; `at` is its lower left corner."""
+        from PIL.Image import fromarray
+        from reportlab.lib.utils import ImageReader
+
+        c = self._canvas
+        scale = size / max(picture.size)
+        c.saveState()
+        c.translate(*at.tolist())
+        c.drawImage(ImageReader(fromarray(picture.image)), 0, 0, *(scale * x for x in picture.size))
+        c.setDash()
+        for kind, lines in picture.lines.items():
+            colour, width = _PICTURED[kind]
+            c.setStrokeColor(colour)
+            c.setLineWidth(min(width, 0.006 * size))
+            path = c.beginPath()
+            for one, two in (scale * lines).tolist():
+                path.moveTo(*one)
+                path.lineTo(*two)
+            c.drawPath(path)
+        for name in picture.names if names else ():
+            c.setFillColor(_PICTURED["joined"][0] if name.kind == "seam" else "#000000")
+            c.setFont("Helvetica-Bold", max(scale * TALL, 1.8) / _CAPITAL)
+            c.drawCentredString(*(scale * name.at).tolist(), strokes.printable(name.text))
+        c.restoreState()
+
+    def _here(self, picture: Picture, at: Array, size: float, loops: Sequence[Array]) -> None:
+        """Fill a part in a picture."""
+        c = self._canvas
+        c.saveState()
+        c.translate(*at.tolist())
+        c.setFillColor(_HERE, alpha=0.6)
+        c.setStrokeColor(_HERE)
+        c.setLineWidth(0.3)
+        path = c.beginPath()
+        for loop in loops:
+            points = (size / max(picture.size) * loop).tolist()
+            path.moveTo(*points[0])
+            for point in points[1:]:
+                path.lineTo(*point)
+            path.close()
+        c.drawPath(path, stroke=1, fill=1, fillMode=0)
+        c.restoreState()
+
     def _begin(self, tiling: Tiling) -> Canvas:
+        return self._begin_page(tiling.page)
+
+    def _begin_page(self, size: tuple[float, float]) -> Canvas:
         if self._page:
             self._canvas.showPage()
         self._page += 1
-        self._canvas.setPageSize([_POINT * side for side in tiling.page])
+        self._canvas.setPageSize([_POINT * side for side in size])
         self._canvas.scale(_POINT, _POINT)
         return self._canvas
 
