@@ -78,8 +78,8 @@ def predict(
 
     A mesh that is no grid, in one piece with a boundary and without handles, is resampled to
     64 x 64 vertices (:func:`gso.parametrization.as_patch`), and the displacements are
-    interpolated at its vertices; not for "denoise". For "developable" that is done by a harmonic
-    map and by the flat image, and the result with less curvature is taken.
+    interpolated at its vertices; not for "denoise". That is done by a harmonic map; for
+    "developable" also by the flat image, where that leaves clearly less curvature.
 
     Parameters
     ----------
