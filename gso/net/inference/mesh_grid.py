@@ -23,8 +23,8 @@ def predicted(mesh: Mesh, task: NetTask, ask: Callable[[Array], Array], guarded:
     """Return a net's result at the vertices of a mesh, (n, 3), or (n, 2) for a flat image.
 
     A mesh that is no grid is resampled to one by a harmonic map. Surfaces are also resampled by
-    their flat image, whose result is taken where it leaves clearly less curvature. Vertices without a face keep their positions, or are at
-    the origin of a flat image.
+    their flat image, whose result is taken where it leaves clearly less curvature. Vertices
+    without a face keep their positions, or are at the origin of a flat image.
 
     Parameters
     ----------
