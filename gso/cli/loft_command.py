@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -72,18 +71,18 @@ def loft(
 
     drawing = not out.lower().endswith(io.suffixes())
     if drawing:
-        writer = writers.check_output(out)
+        writers.check_output(out)
     else:
-        writer = None
         io.check_writable(out)
     file_options.spare([name], [out], force)
     panels = hull_panels(io.read_offsets(name), mirrored=mirrored, rulings=rulings)
-    if writer is None:
-        io.save(whole_hull(panels), out)
+    hull = whole_hull(panels)
+    if drawing:
+        writers.write(drawn(panels, unit), out)
     else:
-        writers.write(drawn(panels, Path(name).stem, unit), out)
-    size, far = whole_hull(panels).diagonal, _ON if max_deviation is None else max_deviation
-    allowed = as_length(far, "--max-deviation", diagonal=size, unit=unit)
+        io.save(hull, out)
+    far = _ON if max_deviation is None else max_deviation
+    allowed = as_length(far, "--max-deviation", diagonal=hull.diagonal, unit=unit)
     found = [record(panel, allowed) for panel in panels]
     if as_json:
         shared.tell_json({"unit": unit, "output": out, "panels": found})
@@ -92,7 +91,7 @@ def loft(
     click.get_current_context().exit(0 if all(one["usable"] for one in found) else 1)
 
 
-def drawn(panels: list[HullPanel], name: str, unit: str) -> Drawing:
+def drawn(panels: list[HullPanel], unit: str) -> Drawing:
     """Return the patterns of panels side by side, in millimetres."""
     from gso.quantities import millimetres
     from gso.workshop import Finish, fitted, of_surface, parts_from

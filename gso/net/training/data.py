@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -235,11 +235,10 @@ def broad(count: int, seed: int, size: int, cache: Path, tick: Tick | None = Non
 
 def _told(tick: Tick | None, what: str, count: int) -> Callable[[int], None] | None:
     """Return a callback that takes the number made only."""
-    return None if tick is None else partial(_tell, tick, what, count)
-
-
-def _tell(tick: Tick, what: str, count: int, made: int) -> None:
-    tick(what, made, count)
+    if tick is None:
+        return None
+    told = tick
+    return lambda made: told(what, made, count)
 
 
 def _kept(draw: Callable[[], NDArray[np.float32]], shape: tuple[int, ...], cache: Path) -> Tensor:
