@@ -12,6 +12,7 @@ from gso.cli.inspect import info, metrics, plot
 from gso.cli.loft_command import loft
 from gso.cli.optimize_command import optimize
 from gso.cli.pieces_command import pieces
+from gso.cli.serve_command import serve
 from gso.cli.strips_command import strips
 from gso.cli.train import train
 from gso.cli.unfold_command import unfold
@@ -76,5 +77,5 @@ def main(ctx: click.Context) -> None:
 
 
 _SURFACES = (optimize, strips, pieces, unfold, loft, fabricate, metrics, info, plot, view)
-for _command in (*_SURFACES, dataset, train, completion):
+for _command in (*_SURFACES, serve, dataset, train, completion):
     main.add_command(_command)

@@ -94,16 +94,15 @@ def loft(
 def drawn(panels: list[HullPanel], unit: str) -> Drawing:
     """Return the patterns of panels side by side, in millimetres."""
     from gso.quantities import millimetres
-    from gso.workshop import Finish, fitted, of_surface, parts_from
+    from gso.workshop import Finish, of_surface
+    from gso.workshop import drawn as side_by_side
     from gso.workshop.names import spelled
-    from gso.workshop.output_files import beside
 
-    finish, parts = Finish(notches=None), []
-    for panel in panels:
-        surface = panel.surface
-        made = of_surface(spelled(panel.name), surface.mesh, surface.pattern, {}, surface.folded)
-        parts += parts_from(fitted(made, millimetres(unit), finish), finish)[0]
-    return beside(parts)
+    made = [
+        of_surface(spelled(p.name), p.surface.mesh, p.surface.pattern, {}, p.surface.folded)
+        for p in panels
+    ]
+    return side_by_side(made, millimetres(unit), Finish(notches=None))[0]
 
 
 def record(panel: HullPanel, allowed: float) -> Json:

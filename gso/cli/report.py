@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from gso.errors import ConvergenceWarning
-from gso.io.json_file import plain
 from gso.metrics import INFO
 from gso.typing import Json
 
@@ -25,27 +24,10 @@ def status_only() -> Iterator[None]:
 
 
 def record(file: str, out: str, result: Result, unit: str = "") -> Json:
-    """Summarise a result without its geometry; `unit` names its unit of length, if known."""
-    from gso.result import headline
+    """Summarise a result of a file; `unit` names its unit of length, if known."""
+    from gso.result import record_of
 
-    return {
-        "input": file,
-        "output": out,
-        "task": result.task,
-        "formulation": result.formulation,
-        "status": result.status.name,
-        "message": str(result.status),
-        "usable": result.usable,
-        "headline": headline(result, unit),
-        "reasons": [reason.record(unit) for reason in result.reasons],
-        "iterations": result.iterations,
-        "seconds": result.seconds.get("total", 0.0),
-        "backend": result.backend,
-        "notes": list(result.notes),
-        "spline": result.details.get("spline"),
-        "details": {k: v for k, v in result.details.items() if isinstance(v, (int, float, str))},
-        "metrics": plain(result.metrics),
-    }
+    return {"input": file, "output": out, **record_of(result, unit)}
 
 
 def text(record: Json) -> str:

@@ -15,7 +15,6 @@ from gso.errors import OptionError
 if TYPE_CHECKING:
     from gso.typing import Ints, Json
     from gso.unfolding import Net
-    from gso.workshop import Drawing, Finish
 
 
 @click.command(
@@ -87,9 +86,11 @@ def unfold(
     """
     import numpy as np
 
+    from gso.quantities import millimetres
     from gso.seams import Labels
     from gso.unfolding import unfold as make
-    from gso.workshop import Finish, writers
+    from gso.workshop import Finish, drawn, of_net, writers
+    from gso.workshop.names import spelled
     from gso.workshop.writers.pdf import SUFFIX, room
 
     writer = writers.check_output(out)
@@ -125,24 +126,13 @@ def unfold(
             net = made(None)
             click.echo(f"note: {error}; its part is on several pages", err=True)
     options = {} if paper is None else {"paper": paper}
-    drawing, bare = drawn(net, Path(name).stem, unit, finish)
+    parts = of_net(spelled(Path(name).stem), net)
+    drawing, bare = drawn([parts], millimetres(unit), finish)
     writers.write(drawing, out, **options)
     if as_json:
         shared.tell_json(record(net, unit) | {"output": out, "notes": bare})
     elif not quiet:
         click.echo("\n".join([*text(net, unit), *(f"note: {note}" for note in bare)]))
-
-
-def drawn(net: Net, name: str, unit: str, finish: Finish) -> tuple[Drawing, list[str]]:
-    """Return the parts of a net side by side, in millimetres, and notes on them."""
-    from gso.quantities import millimetres
-    from gso.workshop import fitted, of_net, parts_from, without_tabs
-    from gso.workshop.names import spelled
-    from gso.workshop.output_files import beside
-
-    made = of_net(spelled(name), net)
-    parts, bare = parts_from(fitted(made, millimetres(unit), finish), finish)
-    return beside(parts), without_tabs(bare)
 
 
 def record(net: Net, unit: str) -> Json:

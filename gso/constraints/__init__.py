@@ -18,7 +18,7 @@ from gso.constraints.glue import Glue
 from gso.constraints.linear import Reduction, reduce
 from gso.constraints.on_curve import OnCurve, SlidingBoundary
 from gso.constraints.positions import Fixed, FixedBoundary, Handle
-from gso.constraints.read import add, kinds, read_constraints, record_of
+from gso.constraints.read import add, from_records, kinds, read_constraints, record_of
 from gso.constraints.ruling import Ruling
 from gso.constraints.smooth import SmoothCurves
 from gso.constraints.symmetry import SymmetryPlane
@@ -50,6 +50,7 @@ __all__ = [
     "add",
     "check",
     "compile_constraints",
+    "from_records",
     "kinds",
     "listed",
     "read_constraints",

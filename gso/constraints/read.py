@@ -75,9 +75,32 @@ def read_constraints(path: AnyPath) -> list[Constraint]:
         raise OptionError(f"{path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
         raise OptionError(f"{path} is no JSON: {error}") from None
+    return from_records(entries, str(path))
+
+
+def from_records(entries: object, where: str = "constraints") -> list[Constraint]:
+    """Return the constraints that a list of records describes, such as those of a file.
+
+    Parameters
+    ----------
+    entries : list of dict
+        As :func:`record_of` returns them.
+    where : str
+        What messages call the list.
+
+    Raises
+    ------
+    OptionError
+        It is no list, or an entry is no constraint.
+
+    Examples
+    --------
+    >>> from_records([{"type": "FixedBoundary"}])
+    [FixedBoundary()]
+    """
     if not isinstance(entries, list):
-        raise OptionError(f'{path} must hold a list, such as [{{"type": "FixedBoundary"}}]')
-    return [_constraint(entry, f"{path}: entry {k}") for k, entry in enumerate(entries)]
+        raise OptionError(f'{where} must hold a list, such as [{{"type": "FixedBoundary"}}]')
+    return [_constraint(entry, f"{where}: entry {k}") for k, entry in enumerate(entries)]
 
 
 def _constraint(entry: object, where: str) -> Constraint:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gso.errors import MeshError
+from gso.io.polygons import are_polygons, of_polygons
 from gso.io.raw_surface import Surface, welded
 from gso.mesh import Mesh
 from gso.typing import MeshLike, Unwelded
@@ -20,7 +21,8 @@ def as_mesh(x: MeshLike, *, weld: float | None = None) -> Mesh:
     Parameters
     ----------
     x : Mesh, array_like (H, W, 3), (vertices, faces), trimesh.Trimesh, str or PathLike
-        A `Mesh` is returned unchanged when `weld` is None.
+        A `Mesh` is returned unchanged when `weld` is None. Faces may be lists of vertices of any
+        length; those of five or more are cut into triangles.
     weld : float, optional
         Merge vertices that lie within this distance of each other (see
         :func:`gso.io.welded`).
@@ -92,7 +94,7 @@ def as_surface(x: MeshLike) -> Surface:
     if trimesh is not None and isinstance(x, trimesh.Scene):
         raise MeshError("a trimesh.Scene is no single mesh; give scene.to_mesh()")
     if isinstance(x, (tuple, list)) and len(x) == 2:
-        return Surface(*x)
+        return of_polygons(*x) if are_polygons(x[1]) else Surface(*x)
     try:
         values: Any = x
         points = np.asarray(values)

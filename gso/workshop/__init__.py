@@ -26,6 +26,7 @@ from gso.workshop.page_views import Views
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
+from gso.workshop.pattern_drawing import drawn
 from gso.workshop.pattern_panels import of_net, of_surface
 from gso.workshop.tabs import TabSeam, with_tabs, without_tabs
 from gso.workshop.thickness import Thickness, thickened
@@ -51,6 +52,7 @@ __all__ = [
     "data_for_page",
     "design_record",
     "designs_of",
+    "drawn",
     "fitted",
     "guide_lines",
     "hull_panels",

@@ -1,0 +1,76 @@
+"""Properties of a mesh in words: size, connectivity, curvature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso import metrics as measure
+from gso.components import average, several, split
+from gso.mesh import Mesh
+from gso.typing import Array
+
+
+def facts(mesh: Mesh) -> list[tuple[str, str]]:
+    """Return names and values of the properties of a mesh, as texts.
+
+    Examples
+    --------
+    >>> from gso.mesh import Mesh
+    >>> known = dict(facts(Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])))
+    >>> known["kind"], known["diagonal"]
+    ('triangles', '5')
+    """
+    used = mesh.used
+    points = mesh.vertices[used]
+    length = mesh.edge_lengths
+    loops = [str(len(loop)) for loop in mesh.boundary_loops]
+    rows = [
+        ("kind", _kind(mesh)),
+        ("vertices", str(len(mesh.vertices))),
+        ("faces", str(len(mesh.faces))),
+        ("edges", str(len(mesh.edges))),
+        ("components", str(np.unique(mesh.components[used]).size)),
+        ("boundary loops", f"{len(loops)}" + (f" ({', '.join(loops)} vertices)" if loops else "")),
+        ("Euler characteristic", str(mesh.euler_characteristic)),
+        ("bounding box", " x ".join(f"{side:.6g}" for side in np.ptp(points, axis=0))),
+        ("from, to", " ".join(map(_point, (points.min(axis=0), points.max(axis=0))))),
+        ("diagonal", f"{mesh.diagonal:.6g}"),
+        ("size", f"{_sizes(mesh)} (farthest vertex from the centroid)"),
+        ("edge length", f"{length.min():.4g} to {length.max():.4g}, mean {length.mean():.4g}"),
+    ]
+    if mesh.stars:
+        positive, negative, absolute = average(measure.curvature_features, mesh)
+        rows += [
+            (
+                "mean |K|",
+                f"{average(measure.mean_abs_K, mesh):.4g} 1/size^2 (1 on a unit sphere)",
+            ),
+            ("loss_gc_worst", f"{average(measure.loss_gc_worst, mesh):.4g} 1/size^2"),
+            ("loss_gc", f"{absolute:.4g} 1/size^2 (published: one triangulation)"),
+            ("K_P, K_N", f"{positive:.4g}, {negative:.4g} 1/size^2 (mean K > 0, mean K < 0)"),
+        ]
+    else:
+        rows.append(("loss_gc", "- (no interior vertex)"))
+    if mesh.attributes is not None:
+        rows.append(("attributes", str(mesh.attributes)))
+    return rows + [("note", note) for note in mesh.notes]
+
+
+def _sizes(mesh: Mesh) -> str:
+    """Format the size of a mesh, or the range of sizes of its components."""
+    if not several(mesh):
+        return f"{mesh.frame.scale:.6g}"
+    found = [part.mesh.frame.scale for part in split(mesh)]
+    return f"components of {min(found):.6g} to {max(found):.6g}"
+
+
+def _kind(mesh: Mesh) -> str:
+    if mesh.grid_shape is not None:
+        return f"grid {mesh.grid_shape[0]} x {mesh.grid_shape[1]}"
+    if mesh.is_triangles:
+        return "triangles"
+    return "quads and triangles" if (mesh.faces < 0).any() else "quads"
+
+
+def _point(point: Array) -> str:
+    return f"({', '.join(f'{c:.6g}' for c in point)})"
