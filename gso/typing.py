@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
@@ -42,6 +42,21 @@ class Polyhedron(Protocol):
         """Vertices of each face."""
 
 
+class PointSet(Protocol):
+    """A mesh of PyVista (``faces``) or meshio (``cells``)."""
+
+    @property
+    def points(self) -> ArrayLike:
+        """Coordinates, (n, 3)."""
+
+
+class CompasMesh(Protocol):
+    """A mesh of COMPAS."""
+
+    def to_vertices_and_faces(self) -> Any:
+        """Return coordinates and the vertices of each face."""
+
+
 @dataclass(frozen=True)
 class Unwelded:
     """Input of :func:`gso.as_mesh` together with how it is read.
@@ -62,7 +77,10 @@ class Unwelded:
 
 
 #: What :func:`gso.as_mesh` takes: a mesh, a grid of points, vertices and faces, or a file.
-MeshLike: TypeAlias = "Polyhedron | Unwelded | ArrayLike | tuple[ArrayLike, ArrayLike] | AnyPath"
+MeshLike: TypeAlias = (
+    "Polyhedron | PointSet | CompasMesh | Unwelded | ArrayLike | "
+    "tuple[ArrayLike, ArrayLike | Sequence[Sequence[int]]] | AnyPath"
+)
 
 
 class Scalar(Protocol):

@@ -32,8 +32,9 @@ from gso.io.cad import (
     save_solids,
     save_spline,
 )
-from gso.io.convert import as_mesh, as_surface
+from gso.io.convert import as_host, as_mesh, as_surface
 from gso.io.flat_svg import save_flat
+from gso.io.hosts import add_host
 from gso.io.lines import save_lines
 from gso.io.offsets import read_offsets
 from gso.io.raw_surface import Surface, welded
@@ -51,6 +52,8 @@ __all__ = [
     "Turned",
     "Unwelded",
     "add_format",
+    "add_host",
+    "as_host",
     "as_mesh",
     "as_surface",
     "check_package",

@@ -1,14 +1,14 @@
-"""Conversion of arrays, files and trimesh objects to a mesh."""
+"""Conversion of arrays, files and meshes of other packages to a mesh, and back."""
 
 from __future__ import annotations
 
 import os
-import sys
 from typing import Any
 
 import numpy as np
 
 from gso.errors import MeshError
+from gso.io import hosts
 from gso.io.polygons import are_polygons, of_polygons
 from gso.io.raw_surface import Surface, welded
 from gso.mesh import Mesh
@@ -20,9 +20,10 @@ def as_mesh(x: MeshLike, *, weld: float | None = None) -> Mesh:
 
     Parameters
     ----------
-    x : Mesh, array_like (H, W, 3), (vertices, faces), trimesh.Trimesh, str or PathLike
-        A `Mesh` is returned unchanged when `weld` is None. Faces may be lists of vertices of any
-        length; those of five or more are cut into triangles.
+    x : Mesh, array_like (H, W, 3), (vertices, faces), mesh of another package, str or PathLike
+        Meshes of trimesh, COMPAS, meshio and PyVista are recognised by their attributes. Faces may
+        be lists of vertices of any length; those of five or more are cut into triangles. A `Mesh`
+        is returned unchanged when `weld` is None.
     weld : float, optional
         Merge vertices that lie within this distance of each other (see
         :func:`gso.io.welded`).
@@ -87,14 +88,11 @@ def as_surface(x: MeshLike) -> Surface:
         from gso.io import read_surface
 
         return read_surface(os.fsdecode(x))
-    # If x is a Trimesh, trimesh has been imported already.
-    trimesh = sys.modules.get("trimesh")
-    if trimesh is not None and isinstance(x, trimesh.Trimesh):
-        return Surface(x.vertices, x.faces)
-    if trimesh is not None and isinstance(x, trimesh.Scene):
-        raise MeshError("a trimesh.Scene is no single mesh; give scene.to_mesh()")
     if isinstance(x, (tuple, list)) and len(x) == 2:
         return of_polygons(*x) if are_polygons(x[1]) else Surface(*x)
+    found = hosts.surface_of(x)
+    if found is not None:
+        return found
     try:
         values: Any = x
         points = np.asarray(values)
@@ -105,5 +103,38 @@ def as_surface(x: MeshLike) -> Surface:
     what = f"an array {points.shape}" if points.dtype.kind in "iuf" else f"{type(x).__name__}"
     raise MeshError(
         f"{what} is no surface: give a Mesh, an array (H, W, 3), a pair (vertices, faces), a "
-        "trimesh.Trimesh, or the path of a mesh file"
+        f"mesh of {', '.join(hosts.names())}, or the path of a mesh file"
     )
+
+
+def as_host(x: MeshLike, name: str) -> Any:
+    """Make the mesh of another package.
+
+    Parameters
+    ----------
+    x : Mesh
+        Or anything that :func:`as_mesh` takes.
+    name : {"compas", "meshio", "pyvista", "trimesh"}
+        The package. Its meshes have the vertices in the same order and the same faces: those of
+        trimesh are triangles, and meshio has the triangles of mixed meshes before the quads.
+
+    Returns
+    -------
+    compas.datastructures.Mesh, meshio.Mesh, pyvista.PolyData or trimesh.Trimesh
+
+    Raises
+    ------
+    OptionError
+        There is no such package here.
+    GSOError
+        It is not installed.
+    MeshError
+        `x` is no surface.
+
+    Examples
+    --------
+    >>> y, x = np.mgrid[:3, :4]
+    >>> as_host(np.stack([x, y, 0 * x], axis=-1), "trimesh")
+    <trimesh.Trimesh(vertices.shape=(12, 3), faces.shape=(12, 3))>
+    """
+    return hosts.made(as_mesh(x), name)

@@ -54,6 +54,15 @@ def of_polygons(vertices: ArrayLike, polygons: Sequence[Sequence[int]]) -> Surfa
     return Surface(points, faces, notes, polygon=polygon)
 
 
+def face_rows(faces: Ints) -> list[list[int]]:
+    """Return faces (m, k) as lists, without the -1 of those with fewer corners.
+
+    >>> face_rows(np.array([[0, 1, 2, -1], [0, 2, 3, 4]]))
+    [[0, 1, 2], [0, 2, 3, 4]]
+    """
+    return [[corner for corner in row if corner >= 0] for row in faces.tolist()]
+
+
 def _rows(polygons: Sequence[Sequence[int]], vertices: int) -> tuple[Ints, Ints]:
     """Return the corners of all polygons, one after another, and the number of each."""
     try:

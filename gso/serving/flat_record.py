@@ -8,9 +8,10 @@ import numpy as np
 
 from gso.components import largest_first
 from gso.io.json_file import plain
+from gso.io.polygons import face_rows
 from gso.mesh import Mesh
 from gso.pattern import Pattern
-from gso.typing import Ints, Json
+from gso.typing import Json
 from gso.unfolding import Net
 from gso.workshop import Part
 
@@ -21,12 +22,7 @@ def mesh_record(mesh: Mesh) -> Json:
     >>> mesh_record(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))["faces"]
     [[0, 1, 2]]
     """
-    return {"vertices": mesh.vertices.tolist(), "faces": rows(mesh.faces)}
-
-
-def rows(table: Ints) -> list[list[int]]:
-    """Return faces (m, k) as lists, without the -1 of those with fewer corners."""
-    return [[corner for corner in row if corner >= 0] for row in table.tolist()]
+    return {"vertices": mesh.vertices.tolist(), "faces": face_rows(mesh.faces)}
 
 
 def pattern_record(pattern: Pattern) -> Json:
@@ -40,7 +36,7 @@ def pattern_record(pattern: Pattern) -> Json:
         part[own.faces] = number
     return {
         "vertices": pattern.flat.tolist(),
-        "faces": rows(pattern.faces),
+        "faces": face_rows(pattern.faces),
         "vertex": pattern.vertex.tolist(),
         "part": part.tolist(),
     }

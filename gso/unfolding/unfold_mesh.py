@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from gso import io
 from gso.errors import MeshError, OptionError
 from gso.geometry.polygon import rectangle
+from gso.io.polygons import face_rows
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.validation import checked_vertices
@@ -153,8 +154,7 @@ def _of_mesh(mesh: Mesh) -> PlanarFaces:
 
 
 def _of_table(points: Array, table: Ints, notes: tuple[str, ...]) -> PlanarFaces:
-    rows = table.tolist()
-    return PlanarFaces.of(points, [[c for c in row if c >= 0] for row in rows], notes)
+    return PlanarFaces.of(points, face_rows(table), notes)
 
 
 def _rows(polygons: object) -> list[list[int]]:
