@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import math
 import shutil
 import subprocess
 import sys
@@ -26,7 +27,11 @@ CUBE = {
     "faces": [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
 }
 #: Programs whose Python is 3.9.
-OLD = [HOSTS / "gso_client.py", HOSTS / "rhino" / "gso_rhino.py"]
+OLD = [
+    HOSTS / "gso_client.py",
+    HOSTS / "rhino" / "gso_rhino.py",
+    HOSTS / "freecad" / "gso_freecad.py",
+]
 
 
 def module(path):
@@ -85,6 +90,17 @@ def test_results(gso_client):
     lines = client.lines_of(found["parts"][0])
     assert [kind for kind, _, _ in lines] == ["cut", *["mountain"] * 5]
     assert client.why_not(found) == []
+
+
+def test_points_on_straight_lines_are_left_out():
+    square = [[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1.5, 2], [0, 2], [0, 0.5]]
+    assert client.corners_of(square) == [[0, 0], [2, 0], [2, 2], [0, 2]]
+    assert client.corners_of(square[1:] + square[:1]) == [[2, 0], [2, 2], [0, 2], [0, 0]]
+    triangle = [[0, 0], [1, 0], [0, 1]]
+    assert client.corners_of(triangle) == triangle
+    turn = [k * math.pi / 50 for k in range(100)]
+    circle = [[math.cos(t), math.sin(t)] for t in turn]
+    assert client.corners_of(circle) == circle
 
 
 def test_errors_name_what_to_do(gso_client):

@@ -8,6 +8,7 @@ folders of the hosts.
 """
 
 import json
+import math
 import os
 import shlex
 import shutil
@@ -16,6 +17,8 @@ import tempfile
 
 #: Environment variable with the command that starts gso.
 VARIABLE = "GSO_COMMAND"
+#: Distance from a straight line, relative to the size, up to which points are on it.
+STRAIGHT = 1e-7
 
 
 class GsoError(Exception):
@@ -160,13 +163,29 @@ class Client:
         return GsoError("gso has ended" + why)
 
 
+def corners_of(polygon):
+    """Return a closed polygon without the points that are on the line through their neighbours."""
+    size = max(max(p) - min(p) for p in zip(*polygon))
+    kept = list(polygon)
+    k = 0
+    while k < len(kept) > 3:
+        (ax, ay), (bx, by), (cx, cy) = kept[k - 1], kept[k], kept[(k + 1) % len(kept)]
+        long = math.hypot(cx - ax, cy - ay)
+        off = abs((cx - ax) * (by - ay) - (cy - ay) * (bx - ax)) / long if long else size
+        ahead = (bx - ax) * (cx - bx) + (by - ay) * (cy - by) > 0
+        if ahead and off <= STRAIGHT * size:
+            del kept[k]
+        else:
+            k += 1
+    return kept
+
+
 def lines_of(part):
     """Return what is drawn of a part: (kind, points, whether they are closed).
 
     Kinds are "cut", "mountain" and "valley" (lines to bend along), and "crease".
     """
-    out = [("cut", part["outline"], True)]
-    out += [("cut", hole, True) for hole in part["holes"]]
+    out = [("cut", corners_of(ring), True) for ring in [part["outline"], *part["holes"]]]
     for bend in part["bends"]:
         out.append(("mountain" if bend["angle"] > 0 else "valley", bend["line"], False))
     return out + [("crease", line, False) for line in part["creases"]]

@@ -41,7 +41,7 @@ def asked(context, method):
 class Run:
     """What the operators share."""
 
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     @classmethod
     def poll(cls, context):

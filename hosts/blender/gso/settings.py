@@ -35,7 +35,8 @@ class GsoSettings(bpy.types.PropertyGroup):
     )
     max_strain: FloatProperty(
         name="Max strain %",
-        description="Largest strain of the patterns of pieces and strips, in per cent; 0: that of gso",
+        description="Largest strain of the patterns of pieces and strips, in per cent; "
+        "0: that of gso",
         default=0.0,
         min=0.0,
         max=100.0,
