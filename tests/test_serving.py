@@ -119,11 +119,24 @@ class TestUnfold:
         assert [round(part["area"]) for part in found["parts"]] == [50_000, 10_000]
 
     def test_merged_vertices(self):
+        corners = [v for face in CUBE["faces"] for v in face]
         apart = {
-            "vertices": [CUBE["vertices"][v] for face in CUBE["faces"] for v in face],
+            "vertices": [CUBE["vertices"][v] for v in corners],
             "faces": np.arange(24).reshape(6, 4).tolist(),
         }
         assert result("unfold", mesh=apart, weld=1e-6)["metrics"]["parts"] == 1
+        # Seams are named by the vertices that are sent, here those of the face at z = 1.
+        rim = [[20, 21], [21, 22], [22, 23], [23, 20]]
+        found = result("unfold", mesh=apart | {"seams": rim}, weld=1e-6)
+        assert [round(part["area"]) for part in found["parts"]] == [50_000, 10_000]
+
+    def test_faces_have_the_numbers_of_the_given_ones(self):
+        # The first two sides as triangles, which are one face of the net.
+        split = [[0, 1, 3], [0, 3, 2], *CUBE["faces"][1:]]
+        flat = result("unfold", mesh=CUBE | {"faces": split})["flat"]
+        assert flat["face"] == list(range(7))
+        sizes = [area(np.array(flat["vertices"])[face]) for face in flat["faces"]]
+        assert sizes == pytest.approx([5e3, 5e3, *[1e4] * 5])
 
 
 class TestOtherMethods:
@@ -234,7 +247,14 @@ class TestErrors:
             ("unfold", {"mesh": CUBE | {"seams": [[0, 7]]}}, "0-7"),
             ("unfold", {"mesh": CUBE, "unit": "mile"}, "mile"),
             ("unfold", {"mesh": CUBE, "output": "net.dwg"}, "no writer for '.dwg'"),
+            ("unfold", {"mesh": CUBE, "output": 7}, "output is 7"),
+            ("unfold", {"mesh": CUBE, "output": "no/such/folder/net.svg"}, "no/such/folder"),
             ("unfold", {"mesh": CUBE, "chord": 1}, "chord is for CAD files"),
+            (
+                "unfold",
+                {"mesh": CUBE | {"seams": [[0, 70]]}, "weld": 0},
+                "vertex that is not there",
+            ),
             ("info", {"mesh": "no such.obj"}, "no such.obj"),
             ("info", {"mesh": {"vertices": [[0, 0, 0]], "faces": [[0, 1, 2, 3, 4]]}}, "face 0"),
             ("flatten", {"mesh": CUBE}, "closed"),
@@ -284,6 +304,16 @@ class TestCancel:
         found = {one["id"]: one for one in said if "progress" not in one}
         assert found[1]["error"]["kind"] == "Cancelled"
         assert found[2]["result"] == {"cancelled": True}
+
+    def test_a_request_that_waits(self):
+        asked = {"mesh": str(ROOT / "examples" / "panel.obj"), "options": "fast"}
+        found, _ = answers(
+            {"id": 1, "method": "optimize", "params": asked},
+            {"id": 2, "method": "unfold", "params": {"mesh": CUBE}},
+            {"id": 3, "method": "cancel", "params": {"id": 2}},
+        )
+        assert "result" in found[1]
+        assert found[2]["error"]["kind"] == "Cancelled"
 
     def test_an_unknown_request(self):
         found, _ = answers({"id": 2, "method": "cancel", "params": {"id": 1}})

@@ -45,10 +45,11 @@ def pattern_record(pattern: Pattern) -> Json:
 def net_record(net: Net, faces: Sequence[Sequence[int]] | None) -> Json:
     """Return the pattern of a net, with the given faces and vertices where there are such.
 
-    Faces that are cut inside are triangles.
+    Faces that are cut inside are triangles. ``face`` has the number of the given face of each.
     """
     known = pattern_record(net.pattern)
     known["vertex"] = net.vertex[net.pattern.vertex].tolist()
+    known["face"] = net.face.tolist()
     if faces is None:
         return known
     # The copy of a given vertex in a given face, if there is one only.
@@ -57,16 +58,18 @@ def net_record(net: Net, faces: Sequence[Sequence[int]] | None) -> Json:
     pairs = np.unique(keys, axis=0).tolist()
     place = {(face, vertex): copy for face, vertex, copy in pairs}
     split = {face for face, vertex, copy in pairs if place[face, vertex] != copy}
-    whole, owner, done = [], [], set()
-    for own, triangle, part in zip(net.face.tolist(), known["faces"], known["part"], strict=True):
+    whole, number, owner, done = [], [], [], set()
+    for own, triangle, part in zip(known["face"], known["faces"], known["part"], strict=True):
+        if own in done:
+            continue
         if own in split:
             whole.append(triangle)
-            owner.append(part)
-        elif own not in done:
+        else:
             done.add(own)
             whole.append([place[own, v] for v in faces[own] if (own, v) in place])
-            owner.append(part)
-    return known | {"faces": whole, "part": owner}
+        number.append(own)
+        owner.append(part)
+    return known | {"faces": whole, "face": number, "part": owner}
 
 
 def part_record(part: Part, unit: float) -> Json:

@@ -14,7 +14,7 @@ from gso.io import Unwelded, as_mesh
 from gso.mesh import Mesh
 from gso.seams import Edges, cut
 from gso.spelling import check_keywords
-from gso.typing import Ints, Json, MeshLike
+from gso.typing import Array, Ints, Json, MeshLike
 from gso.unfolding.unfold_mesh import Polygons
 
 _FIELDS = ("vertices", "faces", "seams")
@@ -28,12 +28,12 @@ class GivenMesh:
 
     Attributes
     ----------
-    surface : str, Unwelded or tuple
-        A file, or vertices and polygons.
+    surface : str, Unwelded, tuple or Mesh
+        A file, vertices and polygons, or a mesh with merged vertices.
     faces : sequence of sequences of int, or None
         The polygons; None for a file, or where vertices are merged.
     seams : ndarray of int, (k, 2)
-        Edges that are marked as seams.
+        Edges of it that are marked as seams.
     """
 
     surface: Polygons
@@ -62,11 +62,10 @@ class GivenMesh:
             raise OptionError("chord is for CAD files, and the mesh is none; leave it out")
         pair = (given["vertices"], given["faces"])
         seams = _edges(given.get("seams"))
-        return (
-            cls(pair, given["faces"], seams)
-            if weld is None
-            else cls(Unwelded(pair, weld), None, seams)
-        )
+        if weld is None:
+            return cls(pair, given["faces"], seams)
+        mesh = as_mesh(pair, weld=weld)
+        return cls(mesh, None, _merged(seams, np.asarray(given["vertices"], float), mesh))
 
     def mesh(self) -> Mesh:
         """Return it as a mesh."""
@@ -81,6 +80,16 @@ class GivenMesh:
     def seams_and(self, more: ArrayLike | None) -> Ints:
         """Return its seams and other edges, (k, 2)."""
         return np.concatenate([self.seams, _edges(more)])
+
+
+def _merged(edges: Ints, points: Array, mesh: Mesh) -> Ints:
+    """Return edges between points as edges of a mesh, in which points were merged."""
+    from scipy.spatial import cKDTree
+
+    if edges.size and not 0 <= edges.min() <= edges.max() < len(points):
+        raise OptionError(f"seams name a vertex that is not there; there are {len(points)}")
+    moved = np.asarray(cKDTree(mesh.vertices).query(points)[1])[edges]
+    return np.asarray(moved[moved[:, 0] != moved[:, 1]], np.int64).reshape(-1, 2)
 
 
 def _edges(given: object) -> Ints:

@@ -82,8 +82,22 @@ def call(name: str, params: Json, progress: ProgressLines) -> Json:
         raise OptionError(f"there is no method {name!r}; {choices(name, METHODS)}")
     method = METHODS[name]
     check_keywords(f"method {name!r}", params, method.parameters)
+    if "output" in params:
+        params = params | {"output": _checked_outputs(params["output"])}
     progress.check()
     return method.run(params, progress)
+
+
+def _checked_outputs(given: object) -> list[str]:
+    """Return the drawings to write, after checking that they can be written."""
+    from gso.workshop import writers
+
+    paths = [given] if isinstance(given, str) else given
+    if not isinstance(paths, list) or not all(isinstance(path, str) for path in paths):
+        raise OptionError(f"output is {given!r}; it must be a path, or a list of paths")
+    for path in paths:
+        writers.check_output(path)
+    return paths
 
 
 def _keywords(method: str, params: Json) -> Keywords:
@@ -166,10 +180,9 @@ def _fabricate(params: Json, progress: ProgressLines) -> Json:
     if len(edges := given.seams_and(params.get("cut"))):
         keywords["cut"] = edges
     unit = millimetres(params.get("unit", "mm"))
-    surface = given.surface if isinstance(given.surface, str) else given.mesh()
     with TemporaryDirectory(prefix="gso-") as temporary:
         folder = params.get("folder")
-        job = fabricate(surface, folder or temporary, **keywords, callback=progress.say)
+        job = fabricate(given.surface, folder or temporary, **keywords, callback=progress.say)
         known = {
             "usable": job.usable,
             "reasons": [reason.record("mm") for reason in job.reasons],
@@ -239,20 +252,17 @@ def _drawn(params: Json, made: Callable[[str], Made]) -> Json:
     from gso.workshop import Finish, drawn, writers
     from gso.workshop.names import spelled
 
-    output = params.get("output")
-    paths = [output] if isinstance(output, str) else list(output or ())
-    for path in paths:
-        writers.check_output(path)
     unit = millimetres(params.get("unit", "mm"))
     name = params.get("name") or _stem(params["mesh"])
     surface = made(spelled(name))
     drawing, _ = drawn([surface], unit, Finish(notches=None))
+    paths = params.get("output", [])
     for path in paths:
         writers.write(drawing, path)
     # In the order of their numbers, which the pattern has too.
     placed = {part.name: part for part in drawing.parts}
     known: Json = {"parts": [part_record(placed[p.name], unit) for p in surface.panels]}
-    return known | ({"files": [str(path) for path in paths]} if paths else {})
+    return known | ({"files": paths} if paths else {})
 
 
 def _stem(mesh: object) -> str:
