@@ -227,6 +227,7 @@ class TestErrors:
             ('{"id": 1, "method": "info", "params": [1]}', '"params" that are no object'),
             ('{"id": 1, "method": "info", "parms": {}}', "did you mean 'params'"),
             ('{"id": 1, "method": "cancel"}', 'has no "id" in its "params"'),
+            ('{"id": 1, "method": "cancel", "params": {"id": [1]}}', 'has no "id" in its "params"'),
         ],
     )
     def test_bad_lines(self, line, said):

@@ -27,6 +27,7 @@ TABLE = (
     ("a file", "gso info design.obj", "size, holes, curvature"),
     ("a result", "gso plot out.npz -o out.png", "a picture"),
     ("a result", "gso view out.npz -o out.html", "a page that turns"),
+    ("Blender, Rhino ...", "gso serve --stdio", "patterns there: docs/hosts.rst"),
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from typing import TypeGuard
 
 from gso.errors import OptionError
 from gso.spelling import check_keywords
@@ -47,6 +48,15 @@ class Request:
     params: Json
 
 
+def is_id(value: object) -> TypeGuard[str | int]:
+    """Tell whether a value can be the id of a request.
+
+    >>> is_id("a"), is_id(7), is_id(True), is_id([7])
+    (True, True, False, False)
+    """
+    return isinstance(value, str | int) and not isinstance(value, bool)
+
+
 def read_request(line: str | bytes, number: int) -> Request:
     """Read a line.
 
@@ -76,7 +86,7 @@ def read_request(line: str | bytes, number: int) -> Request:
     if not isinstance(given, dict):
         raise LineError(number, f"is no JSON object; {advice}")
     id = given.get("id")
-    if isinstance(id, bool) or not isinstance(id, str | int):
+    if not is_id(id):
         raise LineError(number, 'has no "id"; give each request a text or a whole number')
     method, params = given.get("method"), given.get("params", {})
     try:

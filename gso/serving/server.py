@@ -12,7 +12,7 @@ from threading import Event, Lock, Thread
 from gso.errors import ConvergenceWarning, GSOError
 from gso.serving.methods import call
 from gso.serving.progress_lines import Cancelled, ProgressLines
-from gso.serving.protocol import LineError, Request, encoded, read_request
+from gso.serving.protocol import LineError, Request, encoded, is_id, read_request
 from gso.typing import Json
 
 _log = logging.getLogger("gso")
@@ -76,7 +76,7 @@ class Server:
 
     def _cancel(self, request: Request, number: int) -> bool:
         """Cancel a request, and return whether it is there."""
-        if set(request.params) != {"id"}:
+        if set(request.params) != {"id"} or not is_id(request.params["id"]):
             raise LineError(number, 'has no "id" in its "params"; name what to cancel', request.id)
         event = self._running.get(request.params["id"])
         if event is not None:
