@@ -22,8 +22,8 @@ def mesh_of(obj, scale):
 def add_objects(context, obj, method, result, scale):
     """Add the surface and the flat parts of a result as objects of a new collection.
 
-    Parts lie at z = 0 beside the object; bends are edges with the angle in degrees as attribute
-    ``gso_angle``. Faces of the surface have the number of their part as attribute ``gso_part``.
+    Parts lie at z = 0 beside the object. Faces of the surface have the number of their part as the
+    attribute ``gso_part``, vertices of the parts that of their vertex as ``gso_vertex``.
     """
     collection = bpy.data.collections.new(f"{obj.name} {method}")
     context.scene.collection.children.link(collection)
