@@ -147,50 +147,35 @@ def test_commands_may_have_spaces_and_arguments(tmp_path, monkeypatch):
     assert client.command_of() == [str(program), "--flag"]
 
 
-class Rhino:
-    """A cube as Rhino has it: faces with vertices of their own, one edge welded."""
+class RhinoMesh:
+    """A cube as Rhino has it: vertices, and the topology on them."""
 
-    def __init__(self):
+    def __init__(self, welded):
         faces = CUBE["faces"]
-        sides = [(f, frozenset(e)) for f in faces for e in zip(f, f[1:] + f[:1], strict=True)]
-        self.edges = list(dict.fromkeys(edge for _, edge in sides))
-        self.TopologyVertices = self.TopologyEdges = self
+        sides = [frozenset(e) for f in faces for e in zip(f, f[1:] + f[:1], strict=True)]
+        edges = [sorted(edge) for edge in dict.fromkeys(sides)]
+        points = [SimpleNamespace(X=x, Y=y, Z=z) for x, y, z in CUBE["vertices"]]
         self.Faces = SimpleNamespace(Count=len(faces))
-        self.points = [SimpleNamespace(X=x, Y=y, Z=z) for x, y, z in CUBE["vertices"]]
-
-    @property
-    def Count(self):
-        return len(self.points)
-
-    def __getitem__(self, k):
-        return self.points[k]
-
-    def IndicesFromFace(self, k):
-        return CUBE["faces"][k]
-
-
-class RhinoEdges(Rhino):
-    @property
-    def Count(self):
-        return len(self.edges)
-
-    def GetConnectedFaces(self, k):
-        return [0, 1]
-
-    def IsEdgeUnwelded(self, k):
-        return k > 0
-
-    def GetTopologyVertices(self, k):
-        one, other = sorted(self.edges[k])
-        return SimpleNamespace(I=one, J=other)
+        # Rhino has a copy of a vertex for each face at it.
+        self.Vertices = SimpleNamespace(Point3dAt=lambda k: points[k // 3])
+        self.TopologyVertices = SimpleNamespace(
+            Count=len(points),
+            MeshVertexIndices=lambda k: [3 * k, 3 * k + 1, 3 * k + 2],
+            IndicesFromFace=lambda k: faces[k],
+        )
+        self.TopologyEdges = SimpleNamespace(
+            Count=len(edges),
+            GetConnectedFaces=lambda k: [0, 1],
+            IsEdgeUnwelded=lambda k: k >= welded,
+            GetTopologyVertices=lambda k: SimpleNamespace(I=edges[k][0], J=edges[k][1]),
+        )
 
 
-def test_meshes_of_rhino(gso_client):
+@pytest.mark.parametrize(("welded", "seams", "parts"), [(0, 0, 1), (1, 11, 5), (12, 0, 1)])
+def test_meshes_of_rhino(gso_client, welded, seams, parts):
     rhino = module(HOSTS / "rhino" / "gso_rhino.py")
-    mesh = Rhino()
-    mesh.TopologyEdges = RhinoEdges()
-    params = rhino.mesh_params(mesh)
+    params = rhino.mesh_params(RhinoMesh(welded))
     assert params["vertices"] == CUBE["vertices"]
     assert params["faces"] == CUBE["faces"]
-    assert len(params["seams"]) == 11
-    assert gso_client.call("unfold", mesh=params)["metrics"]["parts"] == 5
+    assert len(params["seams"]) == seams
+    assert gso_client.call("unfold", mesh=params)["metrics"]["parts"] == parts

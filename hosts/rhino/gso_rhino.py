@@ -1,6 +1,7 @@
 """Flat patterns of meshes and polysurfaces in Rhino 8: run it in the script editor (Python 3).
 
-Unwelded edges of a mesh are its seams. Patterns are curves on layers, beside the object.
+Unwelded edges of a mesh are its seams, unless all are unwelded. Patterns are curves on layers,
+beside the object.
 """
 
 import os
@@ -33,21 +34,25 @@ LAYERS = {
 
 
 def mesh_params(mesh):
-    """Return a Rhino mesh as a mesh of the protocol, with its unwelded edges as seams."""
+    """Return a Rhino mesh as a mesh of the protocol, with its unwelded edges as seams.
+
+    Without a welded edge there are no seams: such a mesh has copies of its vertices for each face.
+    """
     points, edges = mesh.TopologyVertices, mesh.TopologyEdges
-    seams = []
-    for k in range(edges.Count):
-        if len(edges.GetConnectedFaces(k)) == 2 and edges.IsEdgeUnwelded(k):
-            ends = edges.GetTopologyVertices(k)
-            seams.append([ends.I, ends.J])
+    inner = [k for k in range(edges.Count) if len(edges.GetConnectedFaces(k)) == 2]
+    unwelded = [k for k in inner if edges.IsEdgeUnwelded(k)]
+    pairs = [edges.GetTopologyVertices(k) for k in unwelded] if len(unwelded) < len(inner) else []
     faces = []
     for k in range(mesh.Faces.Count):
         face = list(points.IndicesFromFace(k))
         faces.append(face[:3] if len(face) == 4 and face[2] == face[3] else face)
-    vertices = [
-        [float(x) for x in (points[k].X, points[k].Y, points[k].Z)] for k in range(points.Count)
-    ]
-    return {"vertices": vertices, "faces": faces, "seams": seams}
+    # Topology vertices are in single precision.
+    own = [mesh.Vertices.Point3dAt(points.MeshVertexIndices(k)[0]) for k in range(points.Count)]
+    return {
+        "vertices": [[point.X, point.Y, point.Z] for point in own],
+        "faces": faces,
+        "seams": [[pair.I, pair.J] for pair in pairs],
+    }
 
 
 def brep_file(brep, folder):
