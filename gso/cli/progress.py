@@ -53,7 +53,8 @@ class Line:
             from tqdm import tqdm
 
             style = _TEXT if self._total is None else _BAR
-            self._shown = tqdm(total=self._total, bar_format=style, leave=False)
+            # With a delay the line is not drawn before its text is set.
+            self._shown = tqdm(total=self._total, bar_format=style, leave=False, delay=1e-9)
             self._shown.start_t -= elapsed
         self._shown.total, self._shown.n = self._total, done
         self._shown.set_description_str(what, refresh=False)
