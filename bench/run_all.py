@@ -123,10 +123,8 @@ def _sections(parser: argparse.ArgumentParser, arguments: argparse.Namespace) ->
 
 
 def _screened(out: Path, split: str) -> surfaces.Surfaces:
-    with share() as show:
-        return surfaces.screened(
-            out / "surfaces", split, Store(out), lambda k, n: show(k / n, "surfaces drawn")
-        )
+    with share("surfaces") as show:
+        return surfaces.screened(out / "surfaces", split, Store(out), lambda k, n: show(k / n))
 
 
 def _store(name: str, result: dict[str, object]) -> None:

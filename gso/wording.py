@@ -59,6 +59,22 @@ def percent(value: float, digits: int = 3) -> str:
     return f"{length(shown if shown >= 1e-4 else 0.0, '', digits)} %"
 
 
+def time_left(seconds: float, most: bool = False) -> str:
+    """Say about how long, or with `most` at most how long, something goes on.
+
+    >>> time_left(3.4), time_left(42.0), time_left(1500.0), time_left(9000.0, most=True)
+    ('about 3 s left', 'about 40 s left', 'about 25 min left', 'at most 2.5 h left')
+    """
+    if seconds < 10.0:
+        text = f"{seconds:.0f} s"
+    elif seconds < 600.0:
+        text = f"{5 * round(seconds / 5.0)} s"
+    else:
+        minutes = seconds / 60.0
+        text = f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
+    return f"{'at most' if most else 'about'} {text} left"
+
+
 def logged(callback: Callable[[str], None] | None) -> Callable[[str], None]:
     """Return a function that says what is being done: to a callback, and to the log "gso".
 

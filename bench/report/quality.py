@@ -90,6 +90,7 @@ def blocks(settings: Settings, surfaces: Surfaces) -> Iterator[Block]:
         if method.absent():
             continue
         count = min(settings.counts[method.pace], len(surfaces))
+        count = min(count, settings.peers) if method.peer else count
         timed, size = min(settings.timed, count), _BLOCKS[method.pace]
         both = method.kernels and kernels.compiled()
         again = min(settings.numpy.get(method.pace, 0) if both else 0, timed)

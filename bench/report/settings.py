@@ -15,6 +15,8 @@ class Settings:
         Name of the run.
     counts : dict of str to int
         Largest number of surfaces of a method, by its pace.
+    peers : int
+        Largest number of surfaces of a method that is not of this package.
     timed : int
         Number of surfaces that are timed, one after the other with no other work.
     runs : int
@@ -33,6 +35,7 @@ class Settings:
 
     name: str
     counts: dict[str, int] = field(default_factory=dict)
+    peers: int = 256
     timed: int = 64
     runs: int = 3
     numpy: dict[str, int] = field(default_factory=dict)

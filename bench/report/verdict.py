@@ -94,7 +94,9 @@ class Loss:
         rest = [w for w in self.winners if w not in self.lost]
         if rest:
             text = "; ".join(f"{w}, {w.best_name} {w.best:.3g}" for w in rest)
-            parts.append(f"better than {self.default}, but not than another of ours: {text}")
+            parts.append(
+                f"better than {self.default}; another method of the package is best: {text}"
+            )
         return f"{name}, {'. '.join(parts)}"
 
 

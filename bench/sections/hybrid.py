@@ -314,6 +314,30 @@ def anytime(n: int = 16, data: Path | None = None, plot: str = "anytime.png") ->
     return tabulate(title, ["solve", "iterations"], rows)
 
 
+def effort(n: int = 16, data: Path | None = None) -> dict[str, Any]:
+    """Print what hybrid solves with the effort of a cold solve reach, balanced."""
+    surfaces, rows = split("test", data), {}
+    for side, share in SIZES["balanced"].items():
+        count = min(max(round(n * share), 2), len(surfaces))
+        grids = [resample(np.asarray(surfaces[k], float), side, side) for k in range(count)]
+        _with_effort(grids[0])  # imports and code generation of the first use
+        found = [_with_effort(grid) for grid in progress(grids, f"{side}")]
+        median = {key: float(np.median([one[key] for one in found])) for key in found[0]}
+        rows[f"{side} x {side}"] = {"n": count} | median
+    title = "Effort: hybrid with effort=1 over cold: total CPU time, and metrics; medians"
+    return tabulate(title, ["grid"], rows)
+
+
+def _with_effort(grid: np.ndarray) -> dict[str, float]:
+    """Solve a grid cold, and with a net and the effort of a cold solve."""
+    cold, spent = _cpu(optimize, grid)
+    warm, seconds = _cpu(hybrid.solve, grid, effort=1.0)
+    row = {"time": seconds / spent, "energy": energy(warm) / max(energy(cold), 1e-300)}
+    for name in ("loss_gc_worst", "loss_gc_half", "d_H", "fairness_ratio", "strain_max"):
+        row[name] = warm.metrics[name] / max(cold.metrics[name], 1e-12)
+    return row
+
+
 def elsewhere(n: int = 6, data: Path | None = None, case: str = "") -> dict[str, Any]:
     """Print time and energy from a net's result where hybrid solves start cold, on validation.
 
@@ -370,4 +394,4 @@ def _started_anyway(name: str, grid: np.ndarray) -> dict[str, float]:
     }
 
 
-SECTIONS = (speed, sizes, model, load, guard, anytime, elsewhere)
+SECTIONS = (speed, sizes, model, load, guard, anytime, effort, elsewhere)

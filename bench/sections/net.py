@@ -211,11 +211,10 @@ def _trained(blocks: int, channels: int, stride: int, data: Path, folder: Path) 
         }
     )
     run = folder / config.name
-    with share() as show:
+    with share(config.name) as show:
 
         def told(report: Any) -> None:
-            left = f"{report.left / 60:.0f} min left, loss {report.loss:.4g}"
-            show(report.progress, f"{config.name}: {left}")
+            show(report.progress, f"loss {report.loss:.4g}", report.left)
 
         card = net.train(config, data, run, show=told)
     losses = [r["loss"] for r in read(run) if "loss" in r]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +45,8 @@ def many(
 
         workers = useful_workers(len(files))
     records: dict[int, dict[str, Any]] = {}
-    with progress.files(len(files)) as bar, report.status_only():
+    with closing(progress.Counts()) as bar, report.status_only():
+        bar.tick("files", 0, len(files))
         for item in job.solve_many(files, workers, scheduler):
             file, out = files[item.index], outs[item.index]
             try:
@@ -58,7 +60,7 @@ def many(
                 done = {"input": file, "usable": False, "error": str(error)}
                 bar.write(f"gso: error: {_named(file, str(error))}", file=sys.stderr)
             records[item.index] = done
-            bar.update(1)
+            bar.tick("files", len(records), len(files))
     ordered = [records[k] for k in sorted(records)]
     if table is not None:
         write_json(table, ordered)

@@ -1,23 +1,76 @@
-"""Progress bars on the error stream, shown only in a terminal."""
+"""Progress on the error stream, shown only in a terminal.
+
+All commands have one style: what is done, a bar where the amount of work is known, the time spent,
+and about how long it goes on.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from gso.status import Progress
+from gso.wording import time_left
 
-#: Seconds before the bar of a single solve appears.
+#: Seconds before a line appears.
 PATIENCE = 1.0
+
+#: With and without a bar.
+_BAR = "{desc} {percentage:3.0f}%|{bar:24}| {elapsed}{postfix}"
+_TEXT = "{desc}, {elapsed}{postfix}"
 
 
 def watched() -> bool:
     """Tell whether the error stream is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
+
+
+class Line:
+    """A line of the terminal that shows progress. It is erased when it is closed.
+
+    Parameters
+    ----------
+    total : float or None
+        Amount of work; None if it is not known.
+    """
+
+    def __init__(self, total: float | None = None) -> None:
+        self._total = total
+        self._shown: Any = None
+        self._start = time.monotonic()
+
+    def show(self, what: str, done: float = 0.0, *notes: str, total: float | None = None) -> None:
+        """Show what is being done, the amount of work that is done, and notes."""
+        elapsed = time.monotonic() - self._start
+        if not watched() or elapsed < PATIENCE:
+            return
+        self._total = self._total if total is None else total
+        if self._shown is None:
+            from tqdm import tqdm
+
+            style = _TEXT if self._total is None else _BAR
+            # With a delay the line is not drawn before its text is set.
+            self._shown = tqdm(total=self._total, bar_format=style, leave=False, delay=1e-9)
+            self._shown.start_t -= elapsed
+        self._shown.total, self._shown.n = self._total, done
+        self._shown.set_description_str(what, refresh=False)
+        self._shown.set_postfix_str(", ".join(notes))
+
+    def write(self, text: str, file: Any) -> None:
+        """Print a text to a stream, above the line."""
+        if self._shown is None:
+            print(text, file=file)
+        else:
+            self._shown.write(text, file=file)
+
+    def close(self) -> None:
+        """Erase the line."""
+        if self._shown is not None:
+            self._shown.close()
 
 
 @contextmanager
@@ -26,39 +79,23 @@ def iterations() -> Iterator[Callable[[Progress], None] | None]:
     if not watched():
         yield None
         return
-    start = time.monotonic()
-    bars: list[Any] = []
-    began = (-1, start)
+    began = (-1, 0.0)
 
     def show(progress: Progress) -> None:
         nonlocal began
         now = time.monotonic()
         if progress.stage != began[0]:
             began = (progress.stage, now)
-        if now - start < PATIENCE:
-            return
-        stage = f"stage {progress.stage + 1}/{progress.stages}"
-        if not bars:
-            from tqdm import tqdm
-
-            line = "{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
-            total = progress.iterations
-            bars.append(tqdm(desc=stage, total=total, bar_format=line, leave=False))
-        bar = bars[0]
-        bar.total, bar.n = progress.iterations, progress.iteration
-        bar.set_description_str(stage, refresh=False)
-        said = f"energy {progress.energy:.4g}"
+        notes = [f"energy {progress.energy:.4g}"]
         if progress.iteration:
-            left = progress.iterations - progress.iteration
-            seconds = left * (now - began[1]) / progress.iteration
-            said += f", at most {seconds:.0f} s left in this stage"
-        bar.set_postfix_str(said)
+            most = progress.iterations - progress.iteration
+            seconds = most * (now - began[1]) / progress.iteration
+            notes.append(f"{time_left(seconds, most=True)} in this stage")
+        stage = f"stage {progress.stage + 1}/{progress.stages}"
+        line.show(stage, progress.iteration, *notes, total=max(progress.iterations, 1))
 
-    try:
+    with closing(Line()) as line:
         yield show
-    finally:
-        for bar in bars:
-            bar.close()
 
 
 @contextmanager
@@ -67,22 +104,13 @@ def words() -> Iterator[Callable[[str], None] | None]:
     if not watched():
         yield None
         return
-    from tqdm import tqdm
-
-    with tqdm(bar_format="{desc} [{elapsed}]", leave=False) as bar:
-        yield bar.set_description_str
-
-
-def files(count: int) -> Any:
-    """Return a bar over files, a context with `update(n)` and `write(line, file=...)`."""
-    from tqdm import tqdm
-
-    return tqdm(total=count, disable=not watched(), leave=False, unit="file")
+    with closing(Line()) as line:
+        yield line.show
 
 
 @dataclass
 class Counts:
-    """Consecutive progress bars, one per kind of counted item, and the time spent on each.
+    """Consecutive lines, one per kind of counted item, and the time spent on each.
 
     Attributes
     ----------
@@ -91,7 +119,7 @@ class Counts:
     """
 
     spent: dict[str, tuple[int, float]] = field(default_factory=dict)
-    _bar: Any = None
+    _line: Line = field(default_factory=Line)
     _what: str = ""
     _first: int = 0
     _start: float = 0.0
@@ -99,38 +127,40 @@ class Counts:
     def tick(self, what: str, count: int, total: int) -> None:
         """Show that `count` of `total` items of the kind `what` are done."""
         if what != self._what:
-            from tqdm import tqdm
-
             self.close()
-            # Estimate the remaining time from the mean speed since the start, because files
-            # of many surfaces finish in bursts.
-            self._bar = tqdm(
-                desc=what,
-                total=total,
-                initial=count,
-                smoothing=0,
-                disable=not watched(),
-            )
+            self._line = Line(total)
             self._what, self._first, self._start = what, count, time.perf_counter()
-        self._bar.update(count - self._bar.n if not self._bar.disable else 0)
-        self.spent[what] = (count - self._first, time.perf_counter() - self._start)
+        added, seconds = count - self._first, time.perf_counter() - self._start
+        self.spent[what] = (added, seconds)
+        # From the mean speed since the start, because files of many surfaces finish in bursts.
+        left = [time_left(seconds * (total - count) / added)] if added else []
+        self._line.show(what, count, f"{count} of {total}", *left)
+
+    def write(self, text: str, file: Any) -> None:
+        """Print a text to a stream, above the line."""
+        self._line.write(text, file)
 
     def close(self) -> None:
-        """Close the last bar."""
-        if self._bar is not None:
-            self._bar.close()
+        """Erase the last line."""
+        self._line.close()
 
 
 @contextmanager
-def share() -> Iterator[Callable[[float, str], None]]:
-    """Provide a callback that shows the completed fraction of a task and a text."""
-    from tqdm import tqdm
+def share(what: str) -> Iterator[Callable[..., None]]:
+    """Provide a callback that shows the fraction of `what` that is done, a text, and seconds left.
 
-    line = "{percentage:5.1f}%|{bar}| [{elapsed}{postfix}]"
-    with tqdm(total=1.0, disable=not watched(), bar_format=line) as bar:
+    Without the seconds they are estimated.
+    """
+    start = time.monotonic()
+    first: float | None = None
 
-        def show(done: float, text: str) -> None:
-            bar.n = done
-            bar.set_postfix_str(text)
+    def show(done: float, text: str = "", left: float | None = None) -> None:
+        nonlocal first
+        first = done if first is None else first
+        if left is None and done > first:
+            left = (time.monotonic() - start) * (1.0 - done) / (done - first)
+        said = [text] if text else []
+        line.show(what, done, *said, *([] if left is None else [time_left(left)]))
 
+    with closing(Line(1.0)) as line:
         yield show

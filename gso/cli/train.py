@@ -84,14 +84,14 @@ def train(
     if hours:
         raise OptionError("--hours goes with all; give --minutes")
     made = read(config, **changes, sigma=None if sigma is None else [sigma, sigma])
-    with closing(progress.Counts()) as bars, progress.share() as show:
+    with closing(progress.Counts()) as bars, progress.share("training") as show:
         card = run(
             made,
             data,
             out,
             minutes=minutes,
             device=device,
-            show=lambda report: show(report.progress, _text(report)),
+            show=lambda report: show(report.progress, _text(report), report.left),
             tick=bars.tick,
         )
     if not quiet and card:
@@ -110,13 +110,15 @@ def _all(
     from gso.net.training.loop import MODEL
     from gso.net.training.shipped_nets import train_all
 
-    with closing(progress.Counts()) as bars, progress.share() as show:
+    with closing(progress.Counts()) as bars, progress.share("training") as show:
         cards = train_all(
             data,
             out,
             hours=hours,
             device=device,
-            show=lambda name, report: show(report.progress, f"{name}: {_text(report)}"),
+            show=lambda name, report: show(
+                report.progress, f"{name}: {_text(report)}", report.left
+            ),
             tick=bars.tick,
             **changes,
         )
@@ -159,6 +161,5 @@ def _keep_memory() -> None:
 
 def _text(report: Report) -> str:
     """Format the progress of a run."""
-    hours, minutes = divmod(round(report.left / 60), 60)
     shown = "".join(f", {n} {v:.4g}" for n, v in report.figures.items() if n in _SHOWN)
-    return f"{hours}:{minutes:02d} left, step {report.step}, loss {report.loss:.4g}{shown}"
+    return f"step {report.step}, loss {report.loss:.4g}{shown}"

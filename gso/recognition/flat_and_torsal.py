@@ -9,7 +9,7 @@ import numpy as np
 from gso.geometry.vectors import unit
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
-from gso.recognition.region_growing import SMOOTH
+from gso.recognition.smooth_regions import SMOOTH
 from gso.typing import Array, Flags, Ints
 
 #: Facets from which on a strip is a smooth surface and no polyhedron.

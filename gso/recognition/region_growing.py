@@ -10,21 +10,14 @@ import numpy as np
 from gso.geometry import box_diagonal
 from gso.mesh import topology
 from gso.recognition.facet_graph import FacetGraph
+from gso.recognition.region_members import LOOSE, members
 from gso.recognition.round_surface import RoundSurface, fit_quadrics, fit_round
+from gso.recognition.smooth_regions import SMOOTH, is_smooth
 from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-#: Fold, in radians, up to which a mesh can be a smooth surface: a tube of 12 sides has 30 degrees.
-SMOOTH = np.radians(30.5)
-#: Angle around the axis that one triangle can span, its multiple of the upper quartile, and the
-#: angle that it can always span.
-_WIDEST, _WIDER, _NARROW = np.radians(62.0), 3.0, np.radians(8.0)
-#: Facets around the axis from which on they are a smooth surface.
-_SEVERAL = 2.5
-#: Angle between the normals of a triangle and of the surface, in radians.
-TILTED = np.radians(35.0)
 #: Points of a seed region, their least number for a cylinder (a cone needs one more), and seeds
 #: that are fitted together.
 _POINTS, _FEWEST, _TOGETHER = 48, 8, 2000
@@ -39,13 +32,6 @@ _SEEDS = 20_000
 _PATIENCE = 10
 #: Seeds of a chunk whose fits are tried from the axes of quadrics, too.
 _FURTHER = 100
-#: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
-#: tolerance within which a point is almost on a surface.
-_MANY, _ALMOST = 8.0, 20.0
-#: Angle around the axis from which on cuts may be any curves, in radians.
-_FAR = 3.0
-#: Multiple of the tolerance by which a surface that is curved both ways would be off.
-_SURE = 100.0
 #: Share of a seed region that its surface must hold.
 _KEPT = 0.3
 #: Length of a shared edge, relative to the longest of both facets.
@@ -56,8 +42,8 @@ _ENOUGH = 3000
 _ROUNDS = 8
 #: Share of triangles by which a cone must exceed a cylinder to be one.
 _MORE = 1.02
-#: Share of a region's vertices that are inside of it where several rows of facets are.
-_INSIDE = 0.1
+#: Radius relative to a region's size above which it is flat.
+_HUGE = 1e4
 
 
 @dataclass(frozen=True)
@@ -281,7 +267,7 @@ def _best(
             continue
         reached.append(region.member)
         area = float(graph.areas[region.member].sum())
-        if area > _MORE * most and _is_smooth(graph, region.surface, region.member, free):
+        if area > _MORE * most and is_smooth(graph, region.surface, region.member, free):
             best, most = region, area
     if best is None and len(tried):
         for member in reached:
@@ -321,7 +307,7 @@ def _fitted(
     """
     ids = np.unique(graph.triangles[member])
     if before is not None:
-        ids = ids[before.distances(graph.points[ids]) >= -_LOOSE * graph.tolerance]
+        ids = ids[before.distances(graph.points[ids]) >= -LOOSE * graph.tolerance]
     elif graph.shared[ids].sum() >= _FEWEST + conical:
         ids = ids[graph.shared[ids]]
     if len(ids) < _FEWEST + conical:
@@ -339,201 +325,10 @@ def _fitted(
         starts += list(fit_quadrics(points[None], np.ones((1, len(points)), bool))[1])
     count = len(starts)
     sets = np.broadcast_to(points, (count, *points.shape))
-    goal, given = _LOOSE * graph.tolerance, np.ones(sets.shape[:2], bool)
+    goal, given = LOOSE * graph.tolerance, np.ones(sets.shape[:2], bool)
     fits = fit_round(sets, given, np.stack(starts), conical=conical, goal=goal)
     best = int(np.argmin(fits.worst))
     extent = np.linalg.norm(np.ptp(points, axis=0))
     if not fits.worst[best] <= goal or fits.radius[best] > _HUGE * extent:
         return None
     return fits.surface(best)
-
-
-def members(graph: FacetGraph, surface: RoundSurface, inside: Flags, free: Flags) -> Flags:
-    """Free triangles on a surface that are connected to a region, or to most of it.
-
-    Vertices of holes that were cut into the facets of a mesh are inside the surface.
-    """
-    angle, rho, height = surface.coordinates(graph.points)
-    radius = surface.radius + surface.slope * height
-    depth = (radius - rho) * np.cos(surface.half_angle)
-    on = np.abs(depth) <= graph.tolerance
-    if surface.slope:
-        on &= radius >= -2 * graph.tolerance
-    spans = triangle_spans(surface, angle, rho, graph.triangles)
-    toward = np.einsum("td,td->t", surface.normals(graph.middles), graph.normals)
-    sign = np.sign((toward * graph.areas)[inside].sum())
-    typical = np.quantile(spans[inside], 0.75)
-    widest = min(max(_WIDER * typical, _NARROW), _WIDEST)
-    fits = free & (spans <= widest)
-    sag = radius * np.cos(surface.half_angle) * (1.0 - np.cos(widest / 2))
-    sunk = (depth > graph.tolerance) & (depth <= sag)
-    whole = on[graph.triangles].all(axis=1)
-    if sunk.any():
-        near = fits & (on | sunk)[graph.triangles].all(axis=1)
-        near &= sign * toward >= np.cos(TILTED)
-        cut = (on | (sunk & _within_facets(graph, surface, near)))[graph.triangles].all(axis=1)
-        whole |= near & cut & _chordal(graph, surface, on)[graph.facet]
-    fits &= whole
-    # A thin triangle of vertices on a curved surface may be tilted much, if it is no part of a
-    # plane that cuts the surface.
-    tilted = sign * toward < np.cos(TILTED)
-    area = sign * _turning_areas(surface, angle, height, graph)
-    thin = tilted & fits & (area > 1e-9 * np.abs(area).max())
-    cut = np.bincount(graph.facet, tilted & ~thin) > 0
-    fits &= ~tilted | (thin & ~cut[graph.facet])
-    label = graph.connected(fits)
-    seen = label[inside & fits]
-    if not len(seen):
-        return np.zeros_like(free)
-    return np.asarray(label == np.bincount(seen).argmax())
-
-
-def _chordal(graph: FacetGraph, surface: RoundSurface, on: Flags) -> Flags:
-    """Mark facets (f,) with three of some vertices (n,), and those whose planes hold rulings."""
-    middle = graph.middles[np.unique(graph.facet, return_index=True)[1]]
-    along = surface.axis[None]
-    if surface.apex is not None:
-        along = middle - surface.apex
-        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    off = np.abs((graph.facet_normals * along).sum(axis=1)) * np.sqrt(graph.facet_areas)
-    known = np.asarray(graph.facet_vertices @ on.astype(float)) >= 3
-    return np.asarray(known | (off <= _LOOSE * graph.tolerance))
-
-
-def _within_facets(graph: FacetGraph, surface: RoundSurface, near: Flags) -> Flags:
-    """Mark the vertices of some triangles (t,) at no fold, or at the end of one across rulings.
-
-    Rulings between facets have their ends on the surface. A vertex in a facet, or where an outline
-    meets an edge between facets that is no ruling, is inside the surface.
-    """
-    a, b = graph.points[graph.ends].transpose(1, 0, 2)
-    folded = near[graph.pairs].all(axis=1) & np.not_equal(*graph.facet[graph.pairs].T)
-    ends, along = graph.ends[folded], (b - a)[folded]
-    cosine = np.einsum("ed,ed->e", along, surface.rulings((a + b)[folded] / 2))
-    ruling = np.abs(cosine) > np.cos(TILTED) * np.linalg.norm(along, axis=1)
-    # A vertex in the middle of a row of edges is at the ends of two.
-    weight = np.repeat(np.where(ruling, 2, 1), 2)
-    return np.asarray(np.bincount(ends.ravel(), weight, len(graph.points)) < 2)
-
-
-def _turning_areas(surface: RoundSurface, angle: Array, height: Array, graph: FacetGraph) -> Array:
-    """Return areas of triangles by angle and height, positive seen from outside, (t,)."""
-    a, h = angle[graph.triangles], height[graph.triangles]
-    turn = a - a[:, :1]
-    turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
-    return np.asarray(turn[:, 1] * (h[:, 2] - h[:, 0]) - turn[:, 2] * (h[:, 1] - h[:, 0]))
-
-
-def _covered(angle: Array, rho: Array, ids: Ints, typical: float) -> float:
-    """Angle around the axis between the outermost vertices of a region; a full turn if closed."""
-    around = np.sort(angle[ids[rho[ids] > _APEX * rho[ids].max()]])
-    gap = float(np.diff(around, append=around[:1] + 2 * np.pi).max())
-    return 2 * np.pi - gap if gap > 2 * typical else 2 * np.pi
-
-
-def triangle_spans(surface: RoundSurface, angle: Array, rho: Array, triangles: Ints) -> Array:
-    """Return the angles around the axis that triangles span; a corner at the apex has none."""
-    turn = np.diff(angle[triangles], axis=1, append=angle[triangles[:, :1]])
-    turn = np.abs(turn - 2 * np.pi * np.round(turn / (2 * np.pi)))
-    far = rho > _APEX * max(float(rho.max()), 1e-300)
-    known = far[triangles] & far[np.roll(triangles, -1, axis=1)]
-    return np.asarray(np.where(known, turn, 0.0).max(axis=1))
-
-
-def _is_smooth(graph: FacetGraph, surface: RoundSurface, member: Flags, free: Flags) -> bool:
-    """Whether a region is a smooth surface and no polyhedron, nor a row of a free surface."""
-    triangles = graph.triangles[member]
-    if len(np.unique(graph.facet[member])) < 3:
-        return False
-    ids = np.unique(triangles)
-    angle, rho, _ = surface.coordinates(graph.points)
-    spans = triangle_spans(surface, angle, rho, triangles)
-    typical = float(np.quantile(spans, 0.75))
-    covered = _covered(angle, rho, ids, typical)
-    if float(np.median(spans)) > SMOOTH or covered < _SEVERAL * typical:
-        return False
-    # A plane within the tolerance is a plane.
-    around_mean = graph.points[ids] - graph.points[ids].mean(axis=0)
-    direction = np.linalg.eigh(around_mean.T @ around_mean)[1][:, 0]
-    if np.ptp(around_mean @ direction) <= 4 * graph.tolerance:
-        return False
-    if covered < _MANY * typical and _goes_on(graph, surface, member):
-        return False
-    around = float(np.median(rho[ids])) * covered
-    width = float(graph.areas[member].sum()) / max(around, 1e-300)
-    # A surface that is as curved along its rulings as around would be this much off.
-    off = width**2 * covered / (8 * around)
-    proved = covered >= max(_MANY * typical, _FAR) and off > _SURE * graph.tolerance
-    return _has_straight_rulings(graph, surface, member, free, ids, only_circles=proved)
-
-
-def _goes_on(graph: FacetGraph, surface: RoundSurface, member: Flags) -> bool:
-    """Whether facets beside a region along its rulings lie almost on its surface.
-
-    Three facets of any smooth torsal surface lie on a cone, up to the rounding of coordinates, and
-    the next are a little off.
-    """
-    one, two = member[graph.pairs].T
-    border = (one != two) & (np.abs(graph.folds) <= SMOOTH)
-    ends = graph.points[graph.ends[border]]
-    along = ends[:, 1] - ends[:, 0]
-    cosine = np.einsum("ed,ed->e", along, surface.rulings(ends.mean(axis=1)))
-    ruling = np.abs(cosine) > np.cos(TILTED) * np.linalg.norm(along, axis=1)
-    beside = np.where(one, graph.pairs[:, 1], graph.pairs[:, 0])[border][ruling]
-    if not len(beside):
-        return False
-    facets = np.isin(graph.facet, graph.facet[beside])
-    off = np.abs(surface.distances(graph.points[graph.triangles[facets]].reshape(-1, 3)))
-    worst = np.zeros(int(graph.facet.max()) + 1)
-    np.maximum.at(worst, np.repeat(graph.facet[facets], 3), off)
-    # A vertex of a triangle across the end of a bend may be close by chance.
-    return bool((worst[graph.facet[beside]] <= _ALMOST * graph.tolerance).mean() > 0.5)
-
-
-def _has_straight_rulings(
-    graph: FacetGraph,
-    surface: RoundSurface,
-    member: Flags,
-    free: Flags,
-    ids: Ints,
-    *,
-    only_circles: bool,
-) -> bool:
-    """Whether the rulings are proved straight, by points inside, or end at edges or sharp folds.
-
-    One row of facets of a sphere lies on a cone, too: it ends at circles, and with `only_circles`
-    only these count.
-    """
-    one, two = member[graph.pairs].T
-    inside = np.zeros(len(graph.points), bool)
-    inside[ids] = True
-    border = one != two
-    inside[graph.ends[border]] = False
-    inside[graph.half_edges.origin[_open_edges(graph)]] = False
-    inside[graph.half_edges.dest[_open_edges(graph)]] = False
-    if inside.sum() > _INSIDE * len(ids):
-        return True
-    a, b = graph.points[graph.ends[border]].transpose(1, 0, 2)
-    along = b - a
-    length = np.linalg.norm(along, axis=1)
-    cosine = np.abs(np.einsum("ed,ed->e", along, surface.rulings((a + b) / 2)))
-    across = cosine < np.cos(TILTED) * length
-    fold = np.abs(graph.folds[border])
-    level = not only_circles
-    level |= np.abs(along @ surface.axis) <= _LEVEL * length + 4 * graph.tolerance
-    smooth = across & level & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
-    return bool(length[smooth].sum() <= _INSIDE * max(length[across].sum(), 1e-300))
-
-
-def _open_edges(graph: FacetGraph) -> Flags:
-    return np.asarray(graph.half_edges.twin < 0)
-
-
-#: Slope of an edge against the plane of a circle up to which it is on a circle.
-_LEVEL = 5e-3
-#: Distance from the axis, relative to the largest, below which a point is the apex.
-_APEX = 1e-4
-#: Radius relative to a region's size above which it is flat.
-_HUGE = 1e4
-#: Multiple of the tolerance up to which a seed region may lie off its surface.
-_LOOSE = 4.0

@@ -10,7 +10,8 @@ import numpy as np
 from gso.mesh import topology
 from gso.mesh.slicing import subdivided
 from gso.recognition.facet_graph import FacetGraph
-from gso.recognition.region_growing import TILTED, Region, members
+from gso.recognition.region_growing import Region
+from gso.recognition.region_members import TILTED, members
 from gso.recognition.round_surface import RoundSurface
 from gso.typing import Array, Flags, Ints
 

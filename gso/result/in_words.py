@@ -29,12 +29,15 @@ def headline(result: Result, unit: str = "") -> str:
     >>> bowl = np.dstack([*np.meshgrid(10 * u, 10 * u), 2 * (u**2 + u[:, None] ** 2)])
     >>> from gso.tno import optimize
     >>> headline(optimize(bowl, max_deviation=0.5), "mm")
-    'largest strain 0... %, deviation 0... mm: developable within 0.5 mm'
+    'largest strain 0... %, deviation 0... mm (... % of the diagonal): developable within 0.5 mm'
     """
     found = result.details.get("verdict")
     if found is None:
         return ""
-    said = f"deviation {length(result.deviation, unit)}"
+    far = result.deviation
+    said = f"deviation {length(far, unit)}"
+    if far and (size := result.design.diagonal):
+        said += f" ({percent(far / size, 2)} of the diagonal)"
     if "strain_max" not in found:
         return said
     said = f"largest strain {percent(found['strain_max'])}, {said}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from gso.wording import time_left
+
 #: What the first solve of the design's own pieces is likely to take, and what follows the last,
 #: over what a solve of pieces of the copy takes.
 _DESIGN, _END = 2.0, 1.0
@@ -41,7 +43,7 @@ class RemainingTime:
         if self._of_copy:
             seconds = _mean(self._of_copy)
             solves = 1.0 + _LIKELY * possible + _DESIGN + _END
-            said += _left(seconds * solves)
+            said += ", " + time_left(seconds * solves)
         self._say(said)
 
     def of_design(self, said: str, possible: int) -> None:
@@ -50,7 +52,7 @@ class RemainingTime:
         if self._of_copy:
             seconds = _mean(self._of_copy)
             own = _mean(self._of_design) if self._of_design else _DESIGN * seconds
-            said += _left(own * (1.0 + _LIKELY * possible) + _END * seconds)
+            said += ", " + time_left(own * (1.0 + _LIKELY * possible) + _END * seconds)
         self._say(said)
 
     def _begin(self, solves: list[float]) -> None:
@@ -63,8 +65,3 @@ class RemainingTime:
 
 def _mean(seconds: list[float]) -> float:
     return sum(seconds) / len(seconds)
-
-
-def _left(seconds: float) -> str:
-    """Return seconds in words: from ten on, rounded to fives."""
-    return f", about {round(seconds) if seconds < 10.0 else 5 * round(seconds / 5.0)} s left"

@@ -4,40 +4,40 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from gso import faults, metrics
+from gso import metrics
 from gso.cut_pieces import Pieces
 from gso.errors import GSOError, MeshError
 from gso.executors import open_executor
 from gso.mesh import Mesh
-from gso.pattern import Pattern
-from gso.pipeline.component_results import renumber, worst_status
+from gso.pipeline.component_results import renumber
 from gso.result import Result, StripsResult
-from gso.ruled.fold_lines import Folds
 from gso.ruled.paneling.light_design import LightDesign
-from gso.ruled.paneling.options import RULED, Options
+from gso.ruled.paneling.merged_pieces import (
+    Joint,
+    cancelled,
+    merged,
+    part_of,
+    reasons_against,
+    result_of,
+)
+from gso.ruled.paneling.options import Options
 from gso.ruled.paneling.shared_seams import SharedSeams
 from gso.ruled.paneling.strips_request import StripsRequest, silent
 from gso.ruled.paneling.surface_strips import check_whole, of_surface, wanted
-from gso.ruled.ruled_surface import RuledSurface
-from gso.ruled.together import together
-from gso.rulings import smallest_radius
-from gso.seams import Sheet
 from gso.seams import pieces as search
-from gso.seams.joint_solve import gap, solve_pieces
+from gso.seams.joint_solve import solve_pieces
 from gso.seams.segmentation import Segmentation
-from gso.seams.sheets import flattened
 from gso.solver import Callback
 from gso.status import Progress, Status
-from gso.tasks import Limits, check
+from gso.tasks import check
 from gso.tasks.start import Start
 from gso.typing import Keywords
-from gso.verdict import Code, Measurement, Reason, compare, judge, ordered
-from gso.wording import length
+from gso.verdict import Reason, judge
 
 #: Shares of the allowed distance: what the joint solve of the pieces and the search for them may
 #: use, and the least and the most within which strips follow the shape of the pieces, so that the
@@ -52,30 +52,6 @@ _STRIPS = 8
 _SIDES = (8, 14, 20)
 #: Number of pieces from which on processes make their strips.
 _MANY = 8
-
-
-@dataclass(frozen=True)
-class _Joint:
-    """The joint solve of a design in pieces.
-
-    Attributes
-    ----------
-    design : Mesh
-        The whole design, from which distances count.
-    shape : Pieces
-        Its pieces, made developable; their seams are closed.
-    result : Result
-        The solve.
-    """
-
-    design: Mesh
-    shape: Pieces
-    result: Result
-
-    @cached_property
-    def sheets(self) -> list[Sheet | None]:
-        """The flat patterns of the pieces; None for those without."""
-        return [flattened(piece.mesh) for piece in self.shape]
 
 
 def of_pieces(
@@ -114,7 +90,7 @@ def of_pieces(
     clock = time.perf_counter()
     joint = _together(light, request, division)
     if joint.result.status is Status.CANCELLED:
-        return _cancelled(joint), ()
+        return cancelled(joint), ()
     seconds = time.perf_counter() - clock
     return _of_joint(joint, request, light, division.design, seconds, single=single)
 
@@ -126,12 +102,12 @@ def of_found(
     if found.result is None:
         raise ValueError("the search did not change the shape of the pieces")
     shape = Pieces(found.design, found.opened, found.names)
-    joint = _Joint(light.design, shape, found.result)
+    joint = Joint(light.design, shape, found.result)
     return _of_joint(joint, request, light, found.design, found.seconds)
 
 
 def _of_joint(
-    joint: _Joint,
+    joint: Joint,
     request: StripsRequest,
     light: LightDesign,
     target: Mesh,
@@ -143,17 +119,17 @@ def _of_joint(
     clock = time.perf_counter()
     tried, stopped = _sharing_seams(joint, request, light, target)
     if stopped:
-        return _cancelled(joint), ()
+        return cancelled(joint), ()
     if single and not tried:
         raise MeshError("no points on the seams of the pieces make single strips of them")
     enough = single or (bool(tried) and not tried[0][1])
     for strips, strict in () if enough else _candidates(joint, request, light):
         if any(isinstance(made, Result) and made.status is Status.CANCELLED for made in strips):
-            return _cancelled(joint), ()
+            return cancelled(joint), ()
         # What counts is the distance of the whole from the design, and the gaps at seams.
-        parts = [_part(joint, request, k, made, strict) for k, made in enumerate(strips)]
-        result = _merged(joint, parts)
-        tried.append((result, _reasons(result, request, parts)))
+        parts = [part_of(joint, request, k, made, strict) for k, made in enumerate(strips)]
+        result = merged(joint, parts)
+        tried.append((result, reasons_against(result, request, parts)))
         if not tried[-1][1]:
             break
     result, reasons = min(tried, key=lambda one: (len(one[1]) > 0, one[0].ruled.farthest))
@@ -162,7 +138,7 @@ def _of_joint(
 
 
 def _sharing_seams(
-    joint: _Joint, request: StripsRequest, light: LightDesign, target: Mesh
+    joint: Joint, request: StripsRequest, light: LightDesign, target: Mesh
 ) -> tuple[list[tuple[StripsResult, tuple[Reason, ...]]], bool]:
     """Return the pieces as one strip each, with the same points on both sides of their seams.
 
@@ -206,7 +182,7 @@ def _sharing_seams(
         met = wanted(options, request.max_deviation, 1.0).met(surface)
         status = Status.CONVERGED if met else Status.TARGET_MISSED
         details: Keywords = {"strips": [1] * count, "seam_gap": 0.0}
-        made = _result(joint, surface, [status], ["both sides of a seam are the same"], details)
+        made = result_of(joint, surface, [status], ["both sides of a seam are the same"], details)
         tried.append((made, judge(made, request.limits)))
         if not tried[-1][1]:
             return tried[-1:], False
@@ -214,7 +190,7 @@ def _sharing_seams(
 
 
 def _candidates(
-    joint: _Joint, request: StripsRequest, light: LightDesign
+    joint: Joint, request: StripsRequest, light: LightDesign
 ) -> Iterator[tuple[list[Result | GSOError], bool]]:
     """Yield strips of each piece, and whether only those that follow it closely are to be taken.
 
@@ -272,14 +248,14 @@ def found_pieces(light: LightDesign, request: StripsRequest) -> Segmentation:
     return found
 
 
-def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> _Joint:
+def _together(light: LightDesign, request: StripsRequest, division: Pieces) -> Joint:
     """Solve given pieces together."""
     request.say("joint solve")
     far = None if light.allowed is None else JOINT * light.allowed
     joint = check("developable", max_deviation=far, x0=request.start, verdict=False)
     joint = joint.with_options(joint.options.for_pieces())
     result = solve_pieces(division, joint, request.constraints, request.callback)
-    return _Joint(light.design, division if result.pieces is None else result.pieces, result)
+    return Joint(light.design, division if result.pieces is None else result.pieces, result)
 
 
 def _within(made: Result | GSOError, follow: float, options: Options) -> Result | GSOError:
@@ -329,130 +305,6 @@ def _strips(request: StripsRequest, follow: float | None, mesh: Mesh) -> Result 
         return of_surface(mesh, request, follow)
     except GSOError as error:
         return error
-
-
-@dataclass(frozen=True)
-class _Part:
-    """What a piece became: its surface, how many strips it has, and the reasons against it."""
-
-    surface: RuledSurface
-    strips: int
-    status: Status
-    reasons: tuple[Reason, ...]
-    iterations: int = 0
-
-
-def _part(
-    joint: _Joint, request: StripsRequest, number: int, made: Result | GSOError, strict: bool
-) -> _Part:
-    """Choose between the strips of a piece and the pattern of the joint solve.
-
-    Strips that do not follow the piece closely enough are taken unless this is `strict`.
-    """
-    name, leave = joint.shape.name(number), request.may_leave_pieces
-    if isinstance(made, StripsResult) and not (strict and made.status.is_failure):
-        met = wanted(request.options, None, 1.0).met(made.ruled)
-        if met or not leave:
-            made = replace(made, status=Status.CONVERGED if met else Status.TARGET_MISSED)
-            reasons = tuple(why.within(f"piece {name}") for why in judge(made, Limits()))
-            return _Part(made.ruled, made.ruled.strips, made.status, reasons, made.iterations)
-    sheet = joint.sheets[number] if leave else None
-    if sheet is not None:
-        return _as_it_is(name, sheet, request)
-    why = made if isinstance(made, GSOError) else MeshError("it cannot be laid flat")
-    raise type(why)(f"piece {name}: {why}")
-
-
-def _as_it_is(name: str, sheet: Sheet, request: StripsRequest) -> _Part:
-    """Return a piece with the pattern of the joint solve, without rulings."""
-    count = len(sheet.mesh.faces)
-    none = Folds(np.empty((0, 2), np.int64), np.empty(0), np.empty(0))
-    surface = RuledSurface(
-        mesh=sheet.mesh,
-        strip=np.zeros(count, np.int64),
-        flat=np.zeros(count, bool),
-        rulings=none,
-        creases=none,
-        pattern=Pattern.whole(sheet.mesh, sheet.flat),
-        moved=sheet.mesh.vertices,
-        crossed=0,
-    )
-    measured = {
-        Code.PATTERN_INVERTED: Measurement.count("face", sheet.inverted),
-        Code.PATTERN_OVERLAPS: Measurement.count("face", faults.overlaps(sheet.mesh, sheet.flat)),
-        Code.STRAIN: Measurement(sheet.strain),
-        Code.BEND_RADIUS: Measurement(smallest_radius(sheet.mesh)),
-    }
-    limits = {Code.STRAIN: request.max_strain, Code.BEND_RADIUS: request.options.min_radius}
-    reasons = tuple(why.within(f"piece {name}") for why in compare(measured, limits))
-    return _Part(surface, 0, Status.CONVERGED, reasons)
-
-
-def _merged(joint: _Joint, parts: Sequence[_Part]) -> StripsResult:
-    """Merge the parts into one result."""
-    design, opened = joint.design, joint.shape.opened
-    surface = together([part.surface for part in parts], design)
-    surface = replace(surface, deviation=surface.distances(design, parts=True))
-    points = opened.mesh.vertices.copy()
-    for own, part in zip(joint.shape.parts, parts, strict=True):
-        points[own.vertices] = part.surface.moved
-    apart = gap(opened.mesh.replaced(points), opened.seams)
-    numbers = [part.strips for part in parts]
-    notes = [
-        f"both sides of a seam are up to {length(apart)} apart, as strips follow the joint result "
-        f"within a distance; number of strips of each piece: {', '.join(map(str, numbers))}"
-    ]
-    if 0 in numbers:
-        bare = ", ".join(joint.shape.name(k) for k, n in enumerate(numbers) if n == 0)
-        notes.append(
-            f"no strips follow these pieces closely enough: {bare}; they have no bend lines, and "
-            "are nearly developable"
-        )
-    statuses = [joint.result.status, *(part.status for part in parts)]
-    made = _result(joint, surface, statuses, notes, {"strips": numbers, "seam_gap": apart})
-    made.iterations += sum(part.iterations for part in parts)
-    return made
-
-
-def _result(
-    joint: _Joint,
-    surface: RuledSurface,
-    statuses: Sequence[Status],
-    notes: Sequence[str],
-    details: Keywords,
-) -> StripsResult:
-    """Return the result that a surface of all pieces is."""
-    first = joint.result
-    return StripsResult(
-        task="developable",
-        formulation=RULED,
-        design=joint.design,
-        status=worst_status(statuses),
-        iterations=first.iterations,
-        energy=first.energy,
-        history=first.history,
-        backend=first.backend,
-        warm_start=first.warm_start,
-        notes=(*joint.design.notes, *notes),
-        details={**first.details, **details},
-        pieces=joint.shape,
-        **StripsResult.attributes(surface),
-    )
-
-
-def _reasons(
-    result: StripsResult, request: StripsRequest, parts: Sequence[_Part]
-) -> tuple[Reason, ...]:
-    """Return why strips of pieces are not usable as what was asked for."""
-    whole = {Code.DEVIATION: result.ruled.farthest, Code.SEAM_GAP: result.details["seam_gap"]}
-    own = [why for part in parts for why in part.reasons]
-    return ordered([*own, *compare(whole, dict.fromkeys(whole, request.max_deviation))])
-
-
-def _cancelled(joint: _Joint) -> Result:
-    """Return the joint result, as the solve was ended before there were strips."""
-    notes = (*joint.result.notes, "the solve was ended before there were strips")
-    return replace(joint.result, formulation=RULED, status=Status.CANCELLED, notes=notes)
 
 
 def _numbered(callback: Callback | None, place: int, count: int) -> Callback | None:
