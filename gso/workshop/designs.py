@@ -199,4 +199,6 @@ def several(given: Designs) -> Sequence[MeshLike]:
 
 def _is_mesh(given: object) -> bool:
     """Whether a tuple is vertices and faces rather than several designs."""
-    return isinstance(given, tuple) and len(given) == 2 and not isinstance(given[0], str | Mesh)
+    if not (isinstance(given, tuple) and len(given) == 2):
+        return False
+    return isinstance(given[0], list) or len(getattr(given[0], "shape", ())) == 2
