@@ -1,7 +1,7 @@
 """The gallery: a Sphinx extension that runs example jobs and shows what they write.
 
-Each job is a title, a sentence, command lines, and the pictures that they write. The commands run in
-this process, in a folder of their own with a copy of ``examples``. Pictures stay in
+Each job is a title, a sentence, command lines, and the pictures that they write. The commands run
+in this process, in a folder of their own with a copy of ``examples``. Pictures stay in
 ``docs/generated/gallery`` under a digest of the commands and of all code of the package and the
 examples: a build after a change of these draws them again, any other build takes what is there.
 
@@ -66,8 +66,8 @@ JOBS = (
     Job(
         "panel",
         "A panel that can be bent from a sheet",
-        "A quarter of the teapot's upper body: curvature before and after, the distance between the "
-        "two, and the strain of the flat pattern.",
+        "A quarter of the teapot's upper body: curvature before and after, the distance between "
+        "the two, and the strain of the flat pattern.",
         ["gso optimize examples/panel.obj -o panel.npz --plot panel.png"],
         ["panel.png"],
     ),
