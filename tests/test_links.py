@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from configparser import ConfigParser
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -66,6 +67,13 @@ def test_files_named_by_path_exist(page):
 def test_every_page_is_in_the_index():
     listed = set(re.findall(r"^   (\w+)$", DOCS["index"], re.M))
     assert listed == set(DOCS) - {"index"}
+
+
+def test_every_extra_is_on_the_first_page():
+    setup = ConfigParser()
+    setup.read(ROOT / "setup.cfg")
+    listed = re.findall(r"^   ``(\w+)``,", DOCS["index"], re.M)
+    assert sorted(listed) == sorted(setup["options.extras_require"])
 
 
 def test_version_is_the_same_everywhere():
