@@ -170,7 +170,9 @@ def test_every_option_of_a_command_in_the_readme_exists():
     ours = [line for page in (*SHOWN, *IN_SECTIONS) for line in commands(page)]
     ours = [line for line in ours if line.startswith("gso ")]
     named = set(re.findall(r"--[a-z][a-z-]+", "\n".join(ours)))
-    known = {name for c in main.commands.values() for p in c.params for name in p.opts}
+    groups = [getattr(c, "commands", {"": c}).values() for c in main.commands.values()]
+    params = [p for commands in groups for c in commands for p in c.params]
+    known = {name for p in params for name in (*p.opts, *p.secondary_opts)}
     assert named <= known
 
 
