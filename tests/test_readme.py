@@ -13,6 +13,7 @@ import textwrap
 from dataclasses import fields
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -174,6 +175,19 @@ def test_every_option_of_a_command_in_the_readme_exists():
     params = [p for commands in groups for c in commands for p in c.params]
     known = {name for p in params for name in (*p.opts, *p.secondary_opts)}
     assert named <= known
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_commands_are_understood(page):
+    for line in commands(page):
+        program, *words = shlex.split(line, comments=True)
+        if program != "gso" or not words:
+            continue
+        command = main
+        while words and words[0] in getattr(command, "commands", {}):
+            command = command.commands[words.pop(0)]
+        context = click.Context(command, info_name=command.name)
+        command.make_parser(context).parse_args(words)  # raises for an option that is unknown
 
 
 def test_commands_of_the_continuous_integration():
