@@ -32,7 +32,14 @@ SHOWN = (README, GUIDE, WORKSHOP)
 #: Pages whose sections run one by one, commands and Python in the order in which they stand.
 IN_SECTIONS = (TUTORIALS, HOWTO)
 #: Sections of these that take a few seconds only; the others are slow tests.
-QUICK = ()
+QUICK = (
+    "Stay under a strain",
+    "Reckon with the sheet's thickness",
+    "Repair a scan",
+    "Show progress, and stop",
+    "Read a result in a notebook",
+    "Check a result by yourself",
+)
 PAGES = [README, ROOT / "CONTRIBUTING.rst", *sorted((ROOT / "docs").glob("*.rst"))]
 
 
