@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+import sys
 from importlib.metadata import version as installed
+from pathlib import Path
 from typing import Any
 
 from gso import constraints
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 project = "gso"
 author = "The gso authors"
@@ -19,6 +23,8 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    # gallery.py beside this file
+    "gallery",
 ]
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
@@ -39,7 +45,17 @@ napoleon_use_ivar = True
 
 html_theme = "furo"
 html_title = f"gso {release}"
-html_static_path: list[str] = []
+html_static_path = ["static"]
+html_css_files = ["gallery.css"]
+
+# sphinx-build -b linkcheck docs docs/_build/links
+linkcheck_timeout = 20
+linkcheck_workers = 4
+linkcheck_retries = 2
+# The publisher answers programs with an error page.
+linkcheck_ignore = [r"https://doi\.org/10\.1145/.*"]
+# Anchors of pages that are built by scripts are not in their text.
+linkcheck_anchors_ignore_for_url = [r"https://github\.com/.*"]
 
 
 def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:

@@ -19,7 +19,7 @@ from PIL import Image
 
 import gso
 from gso.mesh import Mesh
-from gso.plot import plot_pieces, plot_result, plot_rulings
+from gso.plot import Panel, View, plot_pieces, plot_result, plot_rulings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,26 @@ def main() -> None:
     noise = np.random.default_rng(0).standard_normal(panel.vertices.shape)
     noisy = panel.replaced(panel.vertices + 0.005 * panel.frame.scale * noise)
     draw("denoise", plot_result(gso.tno.optimize(noisy, task="denoise")))
+    examples()
     workshop()
+
+
+def examples() -> None:
+    """Draw the fox and the scan of the tutorials."""
+    import fox
+    import scan
+
+    mesh = Mesh(*fox.fox())
+    net = gso.unfold(mesh)
+    view, flat = View.of(mesh), net.pattern.flat
+    points = (flat - flat.mean(axis=0)) / mesh.frame.scale
+    panels = [
+        Panel(view.project(mesh.vertices), mesh.faces, "design"),
+        Panel(np.pad(points, ((0, 0), (0, 1))), net.pattern.faces, "parts", shaded=False),
+    ]
+    draw("fox", gso.plot.draw(panels))
+    found = gso.pieces(Mesh(*scan.scan()), max_deviation="2%", denoise="auto", effort="draft")
+    draw("scan", plot_pieces(found))
 
 
 def workshop() -> None:

@@ -27,6 +27,8 @@ def examples_on_path(monkeypatch):
 def load(name):
     if name == "terrain":
         pytest.importorskip("matplotlib")
+    if name == "sheet_metal":
+        pytest.importorskip("OCP", exc_type=ImportError)
     return importlib.import_module(name)
 
 
@@ -445,6 +447,7 @@ def test_whole_teapot_lies_on_its_patches():
         ("irregular", [], 3),
         ("whole", [], 6),
         ("whole", ["sphere", "helmet"], 2),
+        ("sheet_metal", [], 2),
     ],
 )
 def test_scripts_write_their_files(name, options, files, tmp_path, monkeypatch):
@@ -458,3 +461,35 @@ def test_scripts_write_their_files(name, options, files, tmp_path, monkeypatch):
             vertices, faces = read_obj(path)
             assert np.isfinite(vertices).all()
             assert (faces.min(), faces.max()) == (0, len(vertices) - 1)
+
+
+def test_fox_is_closed_symmetric_and_as_high_as_it_says():
+    vertices, faces = load("fox").fox()
+    found = Connectivity(faces)
+    assert found.is_manifold() and not found.boundary and found.components() == 1
+    assert np.ptp(vertices[:, 2]) == 79.0
+    mirrored = vertices * [1, -1, 1]
+    assert cKDTree(vertices).query(mirrored)[0].max() < 1e-12
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    assert np.einsum("td,td->", a, np.cross(b, c)) > 0
+
+
+def test_scan_is_the_helmet_with_noise():
+    helmet, _ = load("whole").helmet()
+    noise = load("scan").scan()[0] - helmet
+    assert noise.std() == pytest.approx(load("scan").NOISE, rel=0.03)
+
+
+def test_duct_unrolls_to_pipes_of_its_radius(tmp_path):
+    made = load("sheet_metal")
+    made.write(made.duct(), tmp_path / "duct.step")
+    made.write(made.bracket(), tmp_path / "bracket.step")
+    found = gso.recognition.recognise(gso.load(tmp_path / "duct.step"))
+    assert [face.kind for face in found.faces] == ["cylinder"] * 3
+    for face in found.faces:
+        assert face.radius == pytest.approx(made.PIPE, rel=1e-9)
+    job = gso.fabricate(tmp_path / "bracket.step", tmp_path / "job", formats=("svg",), workers=0)
+    (part,) = job.parts
+    straight = sum(made.FLANGES) - 2 * (made.INNER + made.THICK)
+    turn = 0.5 * np.pi * (made.INNER + 0.5 * made.THICK)
+    np.testing.assert_allclose(part.size, [straight + turn, made.WIDTH], atol=1e-6)

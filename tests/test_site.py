@@ -47,5 +47,10 @@ def test_links_between_pages_lead_somewhere(site):
         text = page.read_text()
         for target in re.findall(r'href="([^"#:?]+\.html)(?:#[^"]*)?"', text):
             assert (page.parent / target).exists(), (page.name, target)
+        if "_modules" in page.parts:  # of source code: Sphinx links names where they are defined
+            continue
+        for target, anchor in re.findall(r'href="([^"#:?]*\.html|)#([^"]+)"', text):
+            other = (page.parent / target if target else page).read_text()
+            assert f'id="{anchor}"' in other, (page.name, target, anchor)
         for target in re.findall(r'<img[^>]* src="([^":]+)"', text):
             assert (page.parent / target).exists(), (page.name, target)

@@ -13,7 +13,7 @@ TABLE = (
     ("a sculpture, a scan", "gso pieces bunny.obj -o pieces", "few pieces that lie flat"),
     ("a hull, a facade", "gso strips hull.obj -o hull.npz", "exactly developable strips"),
     ("lines of a boat", "gso loft lines.csv -o hull.dxf", "its panels, mirrored pairs"),
-    ("a box, duct, bracket", "gso unfold bracket.step -o net.dxf", "its flat pattern, bend lines"),
+    ("a box, duct, bracket", "gso fabricate part.step -o job", "its flat pattern, bend lines"),
     (
         "any surface as it is",
         "gso optimize shape.obj -o flat.svg --task flatten",

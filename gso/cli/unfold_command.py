@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.command(
     cls=Command,
     short_help="Make the net of a surface of flat faces.",
-    example="gso unfold bracket.step -o bracket.dxf\n"
+    example="gso unfold house.obj -o house.pdf --paper A4 --tabs 5\n"
     "lays flat faces out in one plane, with lines to bend along",
 )
 @click.argument("name", metavar="IN", type=click.Path())
