@@ -46,7 +46,7 @@ class Settings:
 
 
 FULL = Settings(
-    "full", {"fast": 1_000_000, "slow": 64, "peer": 16}, numpy={"fast": 64, "slow": 16, "peer": 8}
+    "full", {"fast": 640, "slow": 64, "peer": 16}, numpy={"fast": 64, "slow": 16, "peer": 8}
 )
 QUICK = Settings(
     "quick",
