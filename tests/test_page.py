@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from gso.workshop import (
     fitted,
     name_place,
     of_net,
+    of_pieces,
     of_surface,
     order_of_joining,
     page_html,
@@ -328,6 +330,72 @@ def test_a_result_has_a_page(tmp_path):
     denoised.save(tmp_path / "flat.npz")
     done = CliRunner().invoke(main, ["view", str(tmp_path / "flat.npz"), "-o", str(out)])
     assert done.exit_code == 1 and "there is no pattern" in done.output
+
+
+class TestCommands:
+    """Commands beside ``gso fabricate`` that write the page."""
+
+    @staticmethod
+    def page(words: list[str], out: Path) -> dict:
+        done = CliRunner().invoke(main, [*words, "--quiet"])
+        assert done.exit_code == 0, done.output
+        return json.loads(read(out.read_text(), "page-data"))
+
+    def test_pieces(self, tmp_path):
+        out = tmp_path / "cut"
+        data = self.page(
+            ["pieces", str(ROOT / "examples" / "panel.obj"), "-o", str(out), "--unit", "m"],
+            out / "index.html",
+        )
+        table = json.loads((out / "pieces.json").read_text())
+        names = {panel["short"]: panel["part"] for panel in data["panels"]}
+        assert sorted(names) == [row["name"] for row in table["pieces"]] and len(names) > 1
+        for row in table["pieces"]:
+            part = data["parts"][names[row["name"]]]
+            sizes = sorted([part["length"], part["width"]])
+            assert sizes[1] <= 1000 * np.hypot(row["length"], row["width"])
+            assert part["area"] == pytest.approx(1e6 * row["area"], rel=0.02)
+        length = sum(seam["length"] for seam in data["seams"])
+        assert length == pytest.approx(1000 * sum(s["length"] for s in table["seams"]))
+        # The shape stays as it is.
+        assert all(panel["values"]["deviation"] == 0.0 for panel in data["panels"])
+
+    def test_pieces_without_a_pattern_are_left_out(self):
+        found = gso.pieces(ROOT / "examples" / "panel.obj")
+        some = replace(found, sheets=(found.sheets[0], *[None] * (len(found) - 1)))
+        assert some.pattern is None
+        made = of_pieces("panel", some, {})
+        assert [panel.name for panel in made.panels] == ["panel-A"] and not made.matings
+        none = replace(found, sheets=(None,) * len(found))
+        with pytest.raises(gso.MeshError, match="none of the pieces"):
+            of_pieces("panel", none, {})
+
+    def test_unfold(self, tmp_path):
+        house, out = ROOT / "examples" / "house.obj", tmp_path / "house.html"
+        svg = str(tmp_path / "house.svg")
+        words = ["unfold", str(house), "-o", svg, "--page", str(out), "--tabs", "6"]
+        data = self.page(words, out)
+        net = gso.unfold(house)
+        assert len(data["panels"]) == len(net) == 1
+        assert len(data["panels"][0]["angles"]) == len(net.folds.edges)
+        assert sum(s["length"] for s in data["seams"]) == pytest.approx(net.cut_length)
+        # Tabs make the part larger than its panel.
+        assert data["parts"][0]["area"] > 1.02 * net.areas[0]
+
+    def test_strips_and_optimize(self, tmp_path):
+        y, turn = np.mgrid[:9, :9] / 8
+        np.save(tmp_path / "arch.npy", np.stack([np.sin(turn), y, np.cos(turn)], axis=-1))
+        file, out = str(tmp_path / "arch.npy"), tmp_path / "page.html"
+        more = ["-o", str(tmp_path / "out.svg"), "--page", str(out)]
+        assert self.page(["strips", file, *more], out)["panels"][0]["angles"]
+        data = self.page(["optimize", file, "--task", "flatten", *more], out)
+        # The surface is in place, not its flat image.
+        data["bytes"] = base64.b64decode(read(out.read_text(), "page-arrays"))
+        points = numbers(data, data["panels"][0]["points"])
+        assert np.ptp(points, axis=0).min() > 0.4
+        more[1] = str(tmp_path / "out.obj")
+        done = CliRunner().invoke(main, ["optimize", file, "--task", "denoise", *more])
+        assert done.exit_code == 1 and "pages show flat patterns" in done.output
 
 
 @pytest.fixture(scope="module")
