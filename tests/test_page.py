@@ -6,8 +6,14 @@ import base64
 import hashlib
 import json
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -101,6 +107,18 @@ def indices(data: dict, entry: dict) -> np.ndarray:
 def data_of(certificate, parts, views) -> dict:
     data = data_for_page(views.shown, parts, certificate)
     return data | {"bytes": base64.b64decode(data["arrays"])}
+
+
+def data_points(html: str, data: dict) -> np.ndarray:
+    """The points in place of all panels of a page."""
+    data = data | {"bytes": base64.b64decode(read(html, "page-arrays"))}
+    return np.concatenate([numbers(data, panel["points"]) for panel in data["panels"]])
+
+
+def arch() -> np.ndarray:
+    """A quarter of a cylinder, as a grid."""
+    y, turn = np.mgrid[:9, :9] / 8
+    return np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
 
 
 def box() -> Mesh:
@@ -316,17 +334,15 @@ class TestPage:
 
 
 def test_a_result_has_a_page(tmp_path):
-    y, turn = np.mgrid[:9, :9] / 8
-    arch = np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
     file, out = tmp_path / "arch.npz", tmp_path / "arch.html"
-    gso.tno.optimize(arch).save(file)
+    gso.tno.optimize(arch()).save(file)
     words = ["view", str(file), "-o", str(out), "--unit", "m"]
     done = CliRunner().invoke(main, words)
     assert done.exit_code == 0, done.output
     data = json.loads(read(out.read_text(), "page-data"))
     (part,) = data["parts"]
     assert sorted([part["length"], part["width"]]) == pytest.approx([1000, 1000], rel=0.01)
-    denoised = gso.tno.optimize(arch, task="denoise")
+    denoised = gso.tno.optimize(arch(), task="denoise")
     denoised.save(tmp_path / "flat.npz")
     done = CliRunner().invoke(main, ["view", str(tmp_path / "flat.npz"), "-o", str(out)])
     assert done.exit_code == 1 and "there is no pattern" in done.output
@@ -383,19 +399,76 @@ class TestCommands:
         assert data["parts"][0]["area"] > 1.02 * net.areas[0]
 
     def test_strips_and_optimize(self, tmp_path):
-        y, turn = np.mgrid[:9, :9] / 8
-        np.save(tmp_path / "arch.npy", np.stack([np.sin(turn), y, np.cos(turn)], axis=-1))
+        np.save(tmp_path / "arch.npy", arch())
         file, out = str(tmp_path / "arch.npy"), tmp_path / "page.html"
         more = ["-o", str(tmp_path / "out.svg"), "--page", str(out)]
         assert self.page(["strips", file, *more], out)["panels"][0]["angles"]
         data = self.page(["optimize", file, "--task", "flatten", *more], out)
         # The surface is in place, not its flat image.
-        data["bytes"] = base64.b64decode(read(out.read_text(), "page-arrays"))
-        points = numbers(data, data["panels"][0]["points"])
-        assert np.ptp(points, axis=0).min() > 0.4
+        assert np.ptp(data_points(out.read_text(), data), axis=0).min() > 0.4
         more[1] = str(tmp_path / "out.obj")
         done = CliRunner().invoke(main, ["optimize", file, "--task", "denoise", *more])
         assert done.exit_code == 1 and "pages show flat patterns" in done.output
+
+
+class TestShow:
+    """``show()`` of results, with an opener of its own in place of the browser."""
+
+    SHOWN: ClassVar = {
+        "optimize": lambda: gso.tno.optimize(arch()),
+        "strips": lambda: gso.strips(arch()),
+        "pieces": lambda: gso.pieces(ROOT / "examples" / "panel.obj"),
+        "unfold": lambda: gso.unfold(box()),
+    }
+
+    @pytest.mark.parametrize("kind", SHOWN)
+    def test_the_page_is_opened(self, kind, monkeypatch):
+        opened = []
+        monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+        self.SHOWN[kind]().show(unit="m", name="shape")
+        (address,) = opened
+        page = Path(url2pathname(urlsplit(address).path))
+        data = json.loads(read(page.read_text(), "page-data"))
+        assert data["designs"][0]["name"] == "shape"
+        size = np.ptp(data_points(page.read_text(), data), axis=0).max()
+        assert size > 500
+        page.unlink()
+
+    def test_the_page_is_there_until_the_end(self):
+        code = (
+            "import gso, webbrowser, numpy as np\n"
+            "webbrowser.open = lambda address: print(address) or True\n"
+            "points = np.moveaxis(np.mgrid[:3, :3, :1], 0, -1)[:, :, 0]\n"
+            "gso.tno.optimize(points.astype(float), task='flatten').show()\n"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert not Path(url2pathname(urlsplit(done.stdout.split()[-1]).path)).exists()
+
+    def test_without_a_browser_it_says_so(self, monkeypatch):
+        monkeypatch.setattr("webbrowser.open", lambda address: False)
+        with pytest.raises(gso.GSOError, match="there is no browser"):
+            gso.unfold(box()).show()
+        with pytest.raises(gso.MeshError, match="there is no pattern"):
+            gso.tno.optimize(arch(), task="denoise").show()
+
+    def test_of_a_job(self, tmp_path, monkeypatch):
+        opened, drawn = [], []
+        monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+        job = gso.fabricate(arch(), tmp_path, unit="m", formats=("svg",), workers=0)
+        job.show()
+        assert opened == [(tmp_path / "index.html").as_uri()]
+        # In a notebook both show pictures.
+        shell = SimpleNamespace(kernel="a kernel")
+        display = SimpleNamespace(display=drawn.append)
+        ipython = SimpleNamespace(get_ipython=lambda: shell, display=display)
+        monkeypatch.setitem(sys.modules, "IPython", ipython)
+        monkeypatch.setitem(sys.modules, "IPython.display", display)
+        job.show()
+        net = gso.unfold(box())
+        net.show()
+        assert drawn == [job, net] and len(opened) == 1
+        assert 'src="data:image/png;base64,' in job._repr_html_()
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import numpy as np
 
 from gso import parametrization
 from gso.cut_pieces import Pieces
+from gso.in_browser import show
 from gso.mesh import Mesh
 from gso.pattern import Bend, Folded, Pattern
 from gso.result import Result
@@ -176,6 +177,7 @@ class Segmentation(Pieces):
         return save(self, folder, unit)
 
     _repr_html_ = html_repr
+    show = show
 
     def __repr__(self) -> str:
         said = f"{len(self)} pieces, seam {self.seam_length:.3g}"

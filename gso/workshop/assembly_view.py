@@ -85,9 +85,8 @@ class Picture:
         for unused in ("width", "height"):
             del page.root.attrib[unused]
         page.root.attrib |= {"class": "picture", "style": f"--w:{self.size[0]:.0f}"}
-        source = f"data:image/png;base64,{base64.b64encode(self.png()).decode()}"
         faces = SubElement(page.root, "g", {"id": name} if name else {})
-        SubElement(faces, "image", {"href": source, "width": width, "height": height})
+        SubElement(faces, "image", {"href": self.source(), "width": width, "height": height})
         for kind, lines in self.lines.items():
             page.path(faces, lines, kind=kind)
         for own in self.names:
@@ -101,6 +100,10 @@ class Picture:
     def png(self) -> bytes:
         """Return the image of the faces as a PNG file."""
         return _png(self.image)
+
+    def source(self) -> str:
+        """Return the same as the address of an image in HTML."""
+        return f"data:image/png;base64,{base64.b64encode(self.png()).decode()}"
 
 
 class Stage:
@@ -260,6 +263,13 @@ def sides(panels: Sequence[Panel]) -> tuple[View, View]:
     """Return the views of panels from the front and from behind."""
     front = View.of(_joined([panel.surface for panel in panels]))
     return front, front.behind
+
+
+def front(made: Made) -> Picture:
+    """Return the picture of a design's panels in their places from the front."""
+    stage = Stage(made, sides(made.panels)[0])
+    stage.add(range(len(made.panels)))
+    return stage.picture(pale_colours(len(made.panels)))
 
 
 class Places:
