@@ -135,7 +135,9 @@ class Browser:
         """Open a file and wait until it is loaded and its first picture is drawn."""
         self.call("Page.navigate", url=path.resolve().as_uri())
         self.wait("document.readyState === 'complete'")
-        self.wait("!window.gsoPage?.viewer || window.gsoPage.viewer.visible.size > 0")
+        # The page unpacks its script.
+        self.wait("window.gsoPage")
+        self.wait("!window.gsoPage.viewer || window.gsoPage.viewer.visible.size > 0")
 
     def run(self, script: str) -> Any:
         """Evaluate an expression on the page; promises are waited for."""

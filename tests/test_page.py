@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,68 +25,25 @@ from gso.cli import main
 from gso.mesh import Mesh
 from gso.workshop import (
     Drawing,
-    Finish,
     Part,
-    Shown,
-    Views,
     data_for_page,
-    design_record,
-    fitted,
     name_place,
     of_net,
     of_pieces,
     of_surface,
     order_of_joining,
-    page_html,
-    parts_from,
     sheet_drawing,
     step_pictures,
 )
 from tests.browser import PROGRAM, Browser
+from tests.page_designs import html_of, job_of, vault
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def vault(rows: int, columns: int, fine: int = 4, name: str = "vault"):
-    """A barrel vault of rows x columns panels of fine x fine quads each, in metres."""
-    turn = np.linspace(0.0, np.pi / 2, rows * fine + 1)
-    y = np.linspace(0.0, 3.0, columns * fine + 1)
-    t, y = np.meshgrid(turn, y, indexing="ij")
-    mesh = Mesh.from_grid(np.stack([2.0 * np.sin(t), y, 2.0 * np.cos(t)], axis=-1))
-    flat = np.stack([2.0 * t, y], axis=-1).reshape(-1, 2)
-    row, column = np.divmod(np.arange(len(mesh.faces)), columns * fine)
-    panel = row // fine * columns + column // fine
-    he = mesh.half_edges
-    inner = he.interior
-    apart = inner[panel[he.face[inner]] != panel[he.face[he.twin[inner]]]]
-    opened = gso.cut(mesh, np.stack([he.origin[apart], he.dest[apart]], axis=1)).opened
-    owner = np.zeros(len(opened.vertex), int)
-    owner[opened.mesh.faces] = panel[:, None]
-    places = flat[opened.vertex] + 0.5 * np.stack(np.divmod(owner, columns), axis=1)
-    pattern = gso.Pattern(places, opened.mesh.faces, opened.vertex, opened.seams)
-    return mesh, of_surface(name, mesh, pattern, {"deviation_max": 0.0})
-
-
-def job_of(mesh: Mesh, made, copies: tuple[Mesh, ...] = ()):
-    """What the page of a design is made of: certificate, parts and views."""
-    finish = Finish()
-    fit = fitted(made, 1000.0, finish)
-    parts, _ = parts_from(fit, finish)
-    record = design_record(fit, parts, [made.name]) | {"reasons": []}
-    for entry in record["parts"]:
-        entry["same_as"] = None
-    certificate = {"usable": True, "reasons": [], "notes": [], "designs": [record], "sheets": []}
-    shown = [Shown(made, mesh, 1000.0, fit.panels, copies)]
-    return certificate, parts, Views(shown, certificate)
-
-
-def html_of(*given) -> str:
-    certificate, parts, views = job_of(*given)
-    return page_html(certificate, parts, [], views)
-
-
-def read(html: str, name: str) -> str:
-    return re.search(f'id="{name}">([^<]*)</script>', html)[1]
+def read(html: str, name: str) -> bytes:
+    """What the page has for its script, unpacked."""
+    return zlib.decompress(base64.b64decode(re.search(f'id="{name}">([^<]*)</script>', html)[1]))
 
 
 def numbers(data: dict, entry: dict) -> np.ndarray:
@@ -111,7 +69,7 @@ def data_of(certificate, parts, views) -> dict:
 
 def data_points(html: str, data: dict) -> np.ndarray:
     """The points in place of all panels of a page."""
-    data = data | {"bytes": base64.b64decode(read(html, "page-arrays"))}
+    data = data | {"bytes": read(html, "page-arrays")}
     return np.concatenate([numbers(data, panel["points"]) for panel in data["panels"]])
 
 
@@ -161,7 +119,7 @@ class TestData:
         )
         html = (tmp_path / "index.html").read_text()
         data = json.loads(read(html, "page-data"))
-        data["bytes"] = base64.b64decode(read(html, "page-arrays"))
+        data["bytes"] = read(html, "page-arrays")
         (record,) = job.certificate["designs"]
         largest = {}
         for name in ("deviation", "strain"):
@@ -287,7 +245,9 @@ class TestDrawings:
 class TestPage:
     def test_it_needs_nothing_else(self):
         html = html_of(*vault(2, 2))
-        assert "http" not in html.replace("http://www.w3.org", "")
+        script = read(html, "page-script").decode()
+        for text in (html, script):
+            assert "http" not in text.replace("http://www.w3.org", "")
         for address in re.findall(r'(?:href|src)="([^"]*)"', html):
             assert address.startswith(("#", "data:image/png;base64,"))
         assert "@import" not in html and "url(" not in html.split("<script")[0]
@@ -308,7 +268,7 @@ class TestPage:
         assert "<img" not in html and "<!--" not in html
         data = json.loads(read(html, "page-data"))
         assert data["panels"][0]["name"] == bad
-        assert html.count("</script>") == 3
+        assert html.count("</script>") == 4
 
     def test_the_list_of_seams_says_which_parts_each_joins(self):
         html = html_of(*vault(1, 3))
