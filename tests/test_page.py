@@ -554,6 +554,34 @@ class TestBrowser:
         browser.run("document.querySelector('table.parts th button').click()")
         assert browser.run("document.querySelector('table.parts tbody tr').dataset.part") == "8"
 
+    def test_numbers_stand_at_their_seams(self, browser):
+        """Of all twelve seams, and of those of a part once it is chosen."""
+        ends = (
+            "gsoPage.viewer.seamsShown().map((e) => [e.seam.number, e.copy.panel, e.seen,"
+            "...gsoPage.viewer.stage.endOnCanvas(e).toArray()])"
+        )
+        every = browser.run(ends)
+        assert len(every) == 24 and sum(end[2] for end in every) >= 20
+        # Both sides of a seam are at one place.
+        sides = {}
+        for number, *_, x, y, _ in every:
+            sides.setdefault(number, []).append((x, y))
+        assert all(np.hypot(*np.subtract(*two)) < 1e-3 for two in sides.values())
+        browser.run("gsoPage.chooseNumber(4)")
+        own = browser.run(ends)
+        _, made = vault(3, 3, 4)
+        expected = {m.number for m in made.matings if 4 in (m.one.panel, m.two.panel)}
+        assert {end[0] for end in own} == expected
+        assert len(own) == 2 * len(expected) and sum(end[1] == 4 for end in own) == len(expected)
+        # They move with their parts.
+        browser.run("gsoPage.viewer.stage.move(1, 1)")
+        apart = {}
+        for number, *_, x, y, _ in browser.run(ends):
+            apart.setdefault(number, []).append((x, y))
+        assert all(np.hypot(*np.subtract(*two)) > 0.02 for two in apart.values())
+        browser.run("gsoPage.viewer.form.elements.seams.click()")
+        assert browser.run(ends) == []
+
     def test_keys_turn_and_choose(self, browser):
         browser.run("gsoPage.viewer.space.focus()")
         before = browser.run("gsoPage.viewer.stage.camera.position.toArray()")
