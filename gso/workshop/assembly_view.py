@@ -89,19 +89,18 @@ class Picture:
         link : callable
             Gives the addresses of names, empty for none.
         name : str
-            Identifier of the group of all but the names, which other pictures may repeat.
+            Identifier of the image of the faces, which other pictures may repeat.
         before : (str, Picture), optional
             A picture of the same view on the same page, with its `name`: only what differs from
             its faces is stored.
         """
         page = PageSVG(np.zeros(2), np.array(self.size), "picture")
         page.root.set("style", f"--w:{self.size[0]:.0f}")
-        group = SubElement(page.root, "g", {"id": name} if name else {})
-        faces = SubElement(group, "g", {"id": f"{name}-faces"} if name else {})
+        faces = SubElement(page.root, "g", {"id": name} if name else {})
         # Pixels from the left, the top, the right and the bottom.
         sides, image = (0, 0, *self.image.shape[1::-1]), self.image
         if before is not None:
-            SubElement(faces, "use", {"href": f"#{before[0]}-faces"})
+            SubElement(faces, "use", {"href": f"#{before[0]}"})
             sides, image = _changed(before[1].image, image)
         if image.size:
             wide, high = sides[2] - sides[0], sides[3] - sides[1]
@@ -109,7 +108,7 @@ class Picture:
             places = {key: f"{side / _FINE:g}" for key, side in look.items() if side}
             SubElement(faces, "image", {"href": _source(image)} | places)
         for kind, lines in self.lines.items():
-            page.path(group, _chains(lines), kind=kind)
+            page.path(page.root, _chains(lines), kind=kind)
         for own in self.names:
             address = link(own.title)
             target = SubElement(page.root, "a", {"href": address} if address else {})

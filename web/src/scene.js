@@ -412,10 +412,18 @@ export class Stage {
     return this.ends;
   }
 
-  // The place of such an end on the canvas (-1 to 1).
-  endOnCanvas({ copy, a, b, s }) {
+  // The place of such an end; on the canvas (-1 to 1); and how far from the viewer it is.
+  endPoint({ copy, a, b, s }) {
     const [one, two] = [a, b].map((v) => new Vector3().fromArray(this.points, 3 * (copy.first + v)));
-    return one.lerp(two, s).project(this.camera);
+    return one.lerp(two, s);
+  }
+
+  endOnCanvas(end) {
+    return this.endPoint(end).project(this.camera);
+  }
+
+  farOf(end) {
+    return this.endPoint(end).distanceTo(this.camera.position);
   }
 
   push(out, v) {

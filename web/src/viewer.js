@@ -9,6 +9,10 @@ const INCH = 25.4;
 const MOVING = 80;
 // Ends of seams up to which all have their numbers; else those of the part that was chosen.
 const FEW = 60;
+// How far behind a face, relative to the size, the edge that it ends at may seem to be.
+const NEAR = 0.01;
+// Pixels from the border of what is seen of a part that a name should keep.
+const ROOM = 7;
 const LABELS = { deviation: "deviation", strain: "strain", curvature: "Gaussian curvature", bending: "bending" };
 
 const FRAME = `
@@ -310,13 +314,16 @@ export class Viewer {
       own[1] += Math.floor(at / wide);
       own[2] += 1;
     });
+    // Where there is room, and there as near to the middle as possible.
+    const room = roomAround(wide, owner);
     const best = new Map();
     owner.forEach((k, at) => {
       if (k < 0) return;
       const [x, y, n] = sums.get(k);
       if (n < 12) return;
       const away = Math.hypot((at % wide) - x / n, Math.floor(at / wide) - y / n);
-      if (away < (best.get(k)?.[0] ?? Infinity)) best.set(k, [away, at]);
+      const known = best.get(k);
+      if (!known || room[at] > known[2] || (room[at] === known[2] && away < known[0])) best.set(k, [away, at, room[at]]);
     });
     this.findSeams(wide, high, owner);
     this.visible = new Map(
@@ -358,14 +365,17 @@ export class Viewer {
     );
   }
 
-  // Tell which ends of seams are seen: their panel is seen within two pixels of them.
+  // Tell which ends of seams are seen: their panel is within two pixels of them, and nothing in front.
   findSeams(wide, high, owner) {
+    const { stage } = this;
     for (const end of this.seamsShown()) {
-      const place = this.stage.endOnCanvas(end);
+      const place = stage.endOnCanvas(end);
       const [x, y] = [Math.floor(0.5 * (place.x + 1) * wide), Math.floor(0.5 * (place.y + 1) * high)];
       end.seen = false;
       for (let i = Math.max(x - 2, 0); i <= Math.min(x + 2, wide - 1); i++)
         for (let j = Math.max(y - 2, 0); j <= Math.min(y + 2, high - 1); j++) end.seen ||= owner[j * wide + i] === end.k;
+      const first = end.seen && stage.pick(place.x, place.y);
+      if (first) end.seen = first.far > stage.farOf(end) - NEAR * stage.around.size;
     }
   }
 
@@ -432,6 +442,25 @@ export class Viewer {
     this.names.set(key, name);
     return name;
   }
+}
+
+// Steps from each pixel to the nearest of another part, up to ROOM.
+function roomAround(wide, owner) {
+  const out = new Uint8Array(owner.length);
+  const last = owner.length - 1;
+  for (const way of [1, -1])
+    for (let n = 0; n <= last; n++) {
+      const at = way > 0 ? n : last - n;
+      const column = at % wide;
+      if (owner[at] < 0 || column === 0 || column === wide - 1) continue;
+      let least = ROOM - 1;
+      for (const step of [1, wide - 1, wide, wide + 1]) {
+        const other = at - way * step;
+        least = Math.min(least, owner[other] === owner[at] ? out[other] : 0);
+      }
+      out[at] = way > 0 ? least + 1 : Math.min(out[at], least + 1);
+    }
+  return out;
 }
 
 function rgb(text) {
