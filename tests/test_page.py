@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 import json
 import re
 import subprocess
@@ -446,21 +447,7 @@ class TestBrowser:
         with Browser() as browser:
             browser.open(place)
             yield browser
-            self.check(browser)
-
-    @staticmethod
-    def check(browser):
-        """No request but for the file, and no error."""
-        browser.run("1")
-        for event in browser.events:
-            method, more = event["method"], event["params"]
-            if method == "Network.requestWillBeSent":
-                assert more["request"]["url"].startswith(("file:", "data:")), more
-            assert method != "Runtime.exceptionThrown", more
-            if method == "Log.entryAdded":
-                assert more["entry"]["level"] != "error", more
-            if method == "Runtime.consoleAPICalled":
-                assert more["type"] not in ("error", "warning", "assert"), more
+            browser.check()
 
     @staticmethod
     def middle(browser, panel: int) -> tuple[float, float]:
@@ -594,8 +581,6 @@ class TestBrowser:
         assert browser.run("gsoPage.state.part") is None
 
     def test_it_prints_one_part_on_a_page(self, browser):
-        import io
-
         pypdf = pytest.importorskip("pypdf")
         pages = [p.extract_text() for p in pypdf.PdfReader(io.BytesIO(browser.pdf())).pages]
         captions = [[n for n in range(1, 10) if f"vault-{n}: " in text] for text in pages]
