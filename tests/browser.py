@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-#: The browser, if it is installed and wanted: ``GSO_BROWSER=1 pytest tests/test_page.py``.
+#: The browser, if it is installed and wanted: ``GSO_BROWSER=1 pytest tests/test_page*.py``.
 PROGRAM = shutil.which("chromium") or shutil.which("google-chrome")
 if not os.environ.get("GSO_BROWSER"):
     PROGRAM = None
@@ -116,6 +116,19 @@ class Browser:
             body += self._read(size)
         return json.loads(body)
 
+    def check(self) -> None:
+        """Check that there was no request but for the file, and no error or warning."""
+        self.run("1")
+        for event in self.events:
+            method, more = event["method"], event["params"]
+            if method == "Network.requestWillBeSent":
+                assert more["request"]["url"].startswith(("file:", "data:")), more
+            assert method != "Runtime.exceptionThrown", more
+            if method == "Log.entryAdded":
+                assert more["entry"]["level"] != "error", more
+            if method == "Runtime.consoleAPICalled":
+                assert more["type"] not in ("error", "warning", "assert"), more
+
     def resize(self, wide: int, high: int) -> None:
         """Set the size of the page, in pixels."""
         self.call(
@@ -135,7 +148,9 @@ class Browser:
         """Open a file and wait until it is loaded and its first picture is drawn."""
         self.call("Page.navigate", url=path.resolve().as_uri())
         self.wait("document.readyState === 'complete'")
-        self.wait("!window.gsoPage?.viewer || window.gsoPage.viewer.visible.size > 0")
+        # The page unpacks its script.
+        self.wait("window.gsoPage")
+        self.wait("!window.gsoPage.viewer || window.gsoPage.viewer.visible.size > 0")
 
     def run(self, script: str) -> Any:
         """Evaluate an expression on the page; promises are waited for."""

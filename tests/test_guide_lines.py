@@ -124,8 +124,10 @@ def test_hidden_lines_are_not_drawn():
     pictures = [picture.svg(lambda name: f"#{name}") for picture in Places(made).pictures]
     assert [len(re.findall("<title", picture)) for picture in pictures] == [1, 2]
     rims = [re.search('<path class="rim" d="([^"]*)"', picture)[1] for picture in pictures]
-    # Eight edges are seen from below, and four from above.
-    assert [rim.count("M") for rim in rims] == [4, 8]
+    # Eight edges are seen from below, and four from above: two numbers each after the first point.
+    steps = [re.findall(r"l([^M]*)", rim) for rim in rims]
+    edges = [sum(len(re.findall(r"-?[\d.]+", step)) // 2 for step in own) for own in steps]
+    assert edges == [4, 8]
 
 
 def test_a_depth_buffer_is_right():

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 import json
 import re
+import subprocess
+import sys
+import zlib
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -17,67 +26,25 @@ from gso.cli import main
 from gso.mesh import Mesh
 from gso.workshop import (
     Drawing,
-    Finish,
     Part,
-    Shown,
-    Views,
     data_for_page,
-    design_record,
-    fitted,
     name_place,
     of_net,
+    of_pieces,
     of_surface,
     order_of_joining,
-    page_html,
-    parts_from,
     sheet_drawing,
     step_pictures,
 )
 from tests.browser import PROGRAM, Browser
+from tests.page_designs import html_of, job_of, vault
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def vault(rows: int, columns: int, fine: int = 4, name: str = "vault"):
-    """A barrel vault of rows x columns panels of fine x fine quads each, in metres."""
-    turn = np.linspace(0.0, np.pi / 2, rows * fine + 1)
-    y = np.linspace(0.0, 3.0, columns * fine + 1)
-    t, y = np.meshgrid(turn, y, indexing="ij")
-    mesh = Mesh.from_grid(np.stack([2.0 * np.sin(t), y, 2.0 * np.cos(t)], axis=-1))
-    flat = np.stack([2.0 * t, y], axis=-1).reshape(-1, 2)
-    row, column = np.divmod(np.arange(len(mesh.faces)), columns * fine)
-    panel = row // fine * columns + column // fine
-    he = mesh.half_edges
-    inner = he.interior
-    apart = inner[panel[he.face[inner]] != panel[he.face[he.twin[inner]]]]
-    opened = gso.cut(mesh, np.stack([he.origin[apart], he.dest[apart]], axis=1)).opened
-    owner = np.zeros(len(opened.vertex), int)
-    owner[opened.mesh.faces] = panel[:, None]
-    places = flat[opened.vertex] + 0.5 * np.stack(np.divmod(owner, columns), axis=1)
-    pattern = gso.Pattern(places, opened.mesh.faces, opened.vertex, opened.seams)
-    return mesh, of_surface(name, mesh, pattern, {"deviation_max": 0.0})
-
-
-def job_of(mesh: Mesh, made, copies: tuple[Mesh, ...] = ()):
-    """What the page of a design is made of: certificate, parts and views."""
-    finish = Finish()
-    fit = fitted(made, 1000.0, finish)
-    parts, _ = parts_from(fit, finish)
-    record = design_record(fit, parts, [made.name]) | {"reasons": []}
-    for entry in record["parts"]:
-        entry["same_as"] = None
-    certificate = {"usable": True, "reasons": [], "notes": [], "designs": [record], "sheets": []}
-    shown = [Shown(made, mesh, 1000.0, fit.panels, copies)]
-    return certificate, parts, Views(shown, certificate)
-
-
-def html_of(*given) -> str:
-    certificate, parts, views = job_of(*given)
-    return page_html(certificate, parts, [], views)
-
-
-def read(html: str, name: str) -> str:
-    return re.search(f'id="{name}">([^<]*)</script>', html)[1]
+def read(html: str, name: str) -> bytes:
+    """What the page has for its script, unpacked."""
+    return zlib.decompress(base64.b64decode(re.search(f'id="{name}">([^<]*)</script>', html)[1]))
 
 
 def numbers(data: dict, entry: dict) -> np.ndarray:
@@ -99,6 +66,18 @@ def indices(data: dict, entry: dict) -> np.ndarray:
 def data_of(certificate, parts, views) -> dict:
     data = data_for_page(views.shown, parts, certificate)
     return data | {"bytes": base64.b64decode(data["arrays"])}
+
+
+def data_points(html: str, data: dict) -> np.ndarray:
+    """The points in place of all panels of a page."""
+    data = data | {"bytes": read(html, "page-arrays")}
+    return np.concatenate([numbers(data, panel["points"]) for panel in data["panels"]])
+
+
+def arch() -> np.ndarray:
+    """A quarter of a cylinder, as a grid."""
+    y, turn = np.mgrid[:9, :9] / 8
+    return np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
 
 
 def box() -> Mesh:
@@ -141,7 +120,7 @@ class TestData:
         )
         html = (tmp_path / "index.html").read_text()
         data = json.loads(read(html, "page-data"))
-        data["bytes"] = base64.b64decode(read(html, "page-arrays"))
+        data["bytes"] = read(html, "page-arrays")
         (record,) = job.certificate["designs"]
         largest = {}
         for name in ("deviation", "strain"):
@@ -267,7 +246,9 @@ class TestDrawings:
 class TestPage:
     def test_it_needs_nothing_else(self):
         html = html_of(*vault(2, 2))
-        assert "http" not in html.replace("http://www.w3.org", "")
+        script = read(html, "page-script").decode()
+        for text in (html, script):
+            assert "http" not in text.replace("http://www.w3.org", "")
         for address in re.findall(r'(?:href|src)="([^"]*)"', html):
             assert address.startswith(("#", "data:image/png;base64,"))
         assert "@import" not in html and "url(" not in html.split("<script")[0]
@@ -288,7 +269,7 @@ class TestPage:
         assert "<img" not in html and "<!--" not in html
         data = json.loads(read(html, "page-data"))
         assert data["panels"][0]["name"] == bad
-        assert html.count("</script>") == 3
+        assert html.count("</script>") == 4
 
     def test_the_list_of_seams_says_which_parts_each_joins(self):
         html = html_of(*vault(1, 3))
@@ -314,20 +295,141 @@ class TestPage:
 
 
 def test_a_result_has_a_page(tmp_path):
-    y, turn = np.mgrid[:9, :9] / 8
-    arch = np.stack([np.sin(turn), y, np.cos(turn)], axis=-1)
     file, out = tmp_path / "arch.npz", tmp_path / "arch.html"
-    gso.tno.optimize(arch).save(file)
+    gso.tno.optimize(arch()).save(file)
     words = ["view", str(file), "-o", str(out), "--unit", "m"]
     done = CliRunner().invoke(main, words)
     assert done.exit_code == 0, done.output
     data = json.loads(read(out.read_text(), "page-data"))
     (part,) = data["parts"]
     assert sorted([part["length"], part["width"]]) == pytest.approx([1000, 1000], rel=0.01)
-    denoised = gso.tno.optimize(arch, task="denoise")
+    denoised = gso.tno.optimize(arch(), task="denoise")
     denoised.save(tmp_path / "flat.npz")
     done = CliRunner().invoke(main, ["view", str(tmp_path / "flat.npz"), "-o", str(out)])
     assert done.exit_code == 1 and "there is no pattern" in done.output
+
+
+class TestCommands:
+    """Commands beside ``gso fabricate`` that write the page."""
+
+    @staticmethod
+    def page(words: list[str], out: Path) -> dict:
+        done = CliRunner().invoke(main, [*words, "--quiet"])
+        assert done.exit_code == 0, done.output
+        return json.loads(read(out.read_text(), "page-data"))
+
+    def test_pieces(self, tmp_path):
+        out = tmp_path / "cut"
+        data = self.page(
+            ["pieces", str(ROOT / "examples" / "panel.obj"), "-o", str(out), "--unit", "m"],
+            out / "index.html",
+        )
+        table = json.loads((out / "pieces.json").read_text())
+        names = {panel["short"]: panel["part"] for panel in data["panels"]}
+        assert sorted(names) == [row["name"] for row in table["pieces"]] and len(names) > 1
+        for row in table["pieces"]:
+            part = data["parts"][names[row["name"]]]
+            sizes = sorted([part["length"], part["width"]])
+            assert sizes[1] <= 1000 * np.hypot(row["length"], row["width"])
+            assert part["area"] == pytest.approx(1e6 * row["area"], rel=0.02)
+        length = sum(seam["length"] for seam in data["seams"])
+        assert length == pytest.approx(1000 * sum(s["length"] for s in table["seams"]))
+        # The shape stays as it is.
+        assert all(panel["values"]["deviation"] == 0.0 for panel in data["panels"])
+
+    def test_pieces_without_a_pattern_are_left_out(self):
+        found = gso.pieces(ROOT / "examples" / "panel.obj")
+        some = replace(found, sheets=(found.sheets[0], *[None] * (len(found) - 1)))
+        assert some.pattern is None
+        made = of_pieces("panel", some, {})
+        assert [panel.name for panel in made.panels] == ["panel-A"] and not made.matings
+        none = replace(found, sheets=(None,) * len(found))
+        with pytest.raises(gso.MeshError, match="none of the pieces"):
+            of_pieces("panel", none, {})
+
+    def test_unfold(self, tmp_path):
+        house, out = ROOT / "examples" / "house.obj", tmp_path / "house.html"
+        svg = str(tmp_path / "house.svg")
+        words = ["unfold", str(house), "-o", svg, "--page", str(out), "--tabs", "6"]
+        data = self.page(words, out)
+        net = gso.unfold(house)
+        assert len(data["panels"]) == len(net) == 1
+        assert len(data["panels"][0]["angles"]) == len(net.folds.edges)
+        assert sum(s["length"] for s in data["seams"]) == pytest.approx(net.cut_length)
+        # Tabs make the part larger than its panel.
+        assert data["parts"][0]["area"] > 1.02 * net.areas[0]
+
+    def test_strips_and_optimize(self, tmp_path):
+        np.save(tmp_path / "arch.npy", arch())
+        file, out = str(tmp_path / "arch.npy"), tmp_path / "page.html"
+        more = ["-o", str(tmp_path / "out.svg"), "--page", str(out)]
+        assert self.page(["strips", file, *more], out)["panels"][0]["angles"]
+        data = self.page(["optimize", file, "--task", "flatten", *more], out)
+        # The surface is in place, not its flat image.
+        assert np.ptp(data_points(out.read_text(), data), axis=0).min() > 0.4
+        more[1] = str(tmp_path / "out.obj")
+        done = CliRunner().invoke(main, ["optimize", file, "--task", "denoise", *more])
+        assert done.exit_code == 1 and "pages show flat patterns" in done.output
+
+
+class TestShow:
+    """``show()`` of results, with an opener of its own in place of the browser."""
+
+    SHOWN: ClassVar = {
+        "optimize": lambda: gso.tno.optimize(arch()),
+        "strips": lambda: gso.strips(arch()),
+        "pieces": lambda: gso.pieces(ROOT / "examples" / "panel.obj"),
+        "unfold": lambda: gso.unfold(box()),
+    }
+
+    @pytest.mark.parametrize("kind", SHOWN)
+    def test_the_page_is_opened(self, kind, monkeypatch):
+        opened = []
+        monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+        self.SHOWN[kind]().show(unit="m", name="shape")
+        (address,) = opened
+        page = Path(url2pathname(urlsplit(address).path))
+        data = json.loads(read(page.read_text(), "page-data"))
+        assert data["designs"][0]["name"] == "shape"
+        size = np.ptp(data_points(page.read_text(), data), axis=0).max()
+        assert size > 500
+        page.unlink()
+
+    def test_the_page_is_there_until_the_end(self):
+        code = (
+            "import gso, webbrowser, numpy as np\n"
+            "webbrowser.open = lambda address: print(address) or True\n"
+            "points = np.moveaxis(np.mgrid[:3, :3, :1], 0, -1)[:, :, 0]\n"
+            "gso.tno.optimize(points.astype(float), task='flatten').show()\n"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert not Path(url2pathname(urlsplit(done.stdout.split()[-1]).path)).exists()
+
+    def test_without_a_browser_it_says_so(self, monkeypatch):
+        monkeypatch.setattr("webbrowser.open", lambda address: False)
+        with pytest.raises(gso.GSOError, match="there is no browser"):
+            gso.unfold(box()).show()
+        with pytest.raises(gso.MeshError, match="there is no pattern"):
+            gso.tno.optimize(arch(), task="denoise").show()
+
+    def test_of_a_job(self, tmp_path, monkeypatch):
+        opened, drawn = [], []
+        monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+        job = gso.fabricate(arch(), tmp_path, unit="m", formats=("svg",), workers=0)
+        job.show()
+        assert opened == [(tmp_path / "index.html").as_uri()]
+        # In a notebook both show pictures.
+        shell = SimpleNamespace(kernel="a kernel")
+        display = SimpleNamespace(display=drawn.append)
+        ipython = SimpleNamespace(get_ipython=lambda: shell, display=display)
+        monkeypatch.setitem(sys.modules, "IPython", ipython)
+        monkeypatch.setitem(sys.modules, "IPython.display", display)
+        job.show()
+        net = gso.unfold(box())
+        net.show()
+        assert drawn == [job, net] and len(opened) == 1
+        assert 'src="data:image/png;base64,' in job._repr_html_()
 
 
 @pytest.fixture(scope="module")
@@ -345,21 +447,7 @@ class TestBrowser:
         with Browser() as browser:
             browser.open(place)
             yield browser
-            self.check(browser)
-
-    @staticmethod
-    def check(browser):
-        """No request but for the file, and no error."""
-        browser.run("1")
-        for event in browser.events:
-            method, more = event["method"], event["params"]
-            if method == "Network.requestWillBeSent":
-                assert more["request"]["url"].startswith(("file:", "data:")), more
-            assert method != "Runtime.exceptionThrown", more
-            if method == "Log.entryAdded":
-                assert more["entry"]["level"] != "error", more
-            if method == "Runtime.consoleAPICalled":
-                assert more["type"] not in ("error", "warning", "assert"), more
+            browser.check()
 
     @staticmethod
     def middle(browser, panel: int) -> tuple[float, float]:
@@ -453,6 +541,34 @@ class TestBrowser:
         browser.run("document.querySelector('table.parts th button').click()")
         assert browser.run("document.querySelector('table.parts tbody tr').dataset.part") == "8"
 
+    def test_numbers_stand_at_their_seams(self, browser):
+        """Of all twelve seams, and of those of a part once it is chosen."""
+        ends = (
+            "gsoPage.viewer.seamsShown().map((e) => [e.seam.number, e.copy.panel, e.seen,"
+            "...gsoPage.viewer.stage.endOnCanvas(e).toArray()])"
+        )
+        every = browser.run(ends)
+        assert len(every) == 24 and sum(end[2] for end in every) >= 20
+        # Both sides of a seam are at one place.
+        sides = {}
+        for number, *_, x, y, _ in every:
+            sides.setdefault(number, []).append((x, y))
+        assert all(np.hypot(*np.subtract(*two)) < 1e-3 for two in sides.values())
+        browser.run("gsoPage.chooseNumber(4)")
+        own = browser.run(ends)
+        _, made = vault(3, 3, 4)
+        expected = {m.number for m in made.matings if 4 in (m.one.panel, m.two.panel)}
+        assert {end[0] for end in own} == expected
+        assert len(own) == 2 * len(expected) and sum(end[1] == 4 for end in own) == len(expected)
+        # They move with their parts.
+        browser.run("gsoPage.viewer.stage.move(1, 1)")
+        apart = {}
+        for number, *_, x, y, _ in browser.run(ends):
+            apart.setdefault(number, []).append((x, y))
+        assert all(np.hypot(*np.subtract(*two)) > 0.02 for two in apart.values())
+        browser.run("gsoPage.viewer.form.elements.seams.click()")
+        assert browser.run(ends) == []
+
     def test_keys_turn_and_choose(self, browser):
         browser.run("gsoPage.viewer.space.focus()")
         before = browser.run("gsoPage.viewer.stage.camera.position.toArray()")
@@ -465,8 +581,6 @@ class TestBrowser:
         assert browser.run("gsoPage.state.part") is None
 
     def test_it_prints_one_part_on_a_page(self, browser):
-        import io
-
         pypdf = pytest.importorskip("pypdf")
         pages = [p.extract_text() for p in pypdf.PdfReader(io.BytesIO(browser.pdf())).pages]
         captions = [[n for n in range(1, 10) if f"vault-{n}: " in text] for text in pages]

@@ -54,7 +54,7 @@ def test_representations_are_short(name):
         assert len(shown) <= LINES * (WIDTH + 1), where
 
 
-@pytest.mark.parametrize("name", ["mesh", "flatten", "loft", "pieces"])
+@pytest.mark.parametrize("name", ["mesh", "flatten", "loft", "pieces", "unfold"])
 def test_notebooks_show_a_picture(name, monkeypatch):
     pytest.importorskip("matplotlib")
     found = MADE[name]()

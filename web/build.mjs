@@ -38,6 +38,7 @@ await build({
   supported: { "inline-script": false },
   plugins: [withoutAddresses],
 });
+await build({ ...common, entryPoints: [join(here, "src", "boot.js")], outfile: join(out, "boot.js"), format: "iife", target: "es2020" });
 await build({ ...common, entryPoints: [join(here, "src", "page.css")], outfile: join(out, "page.css") });
 copyFileSync(join(here, "node_modules", "three", "LICENSE"), join(out, "LICENSE-three.txt"));
 
@@ -50,7 +51,7 @@ for (const name of sources.sort()) {
 }
 const packages = JSON.parse(readFileSync(join(here, "package.json"), "utf-8")).devDependencies;
 const files = {};
-for (const name of ["page.js", "page.css", "LICENSE-three.txt"])
+for (const name of ["boot.js", "page.js", "page.css", "LICENSE-three.txt"])
   files[name] = createHash("sha256").update(readFileSync(join(out, name))).digest("hex");
 const said = { sources: digest.digest("hex"), files, packages };
 writeFileSync(join(out, "built.json"), JSON.stringify(said, null, 2) + "\n");

@@ -1,4 +1,4 @@
-"""From designs to the cutter: time, parts, distances, mismatch of seams, density of nesting.
+"""From designs to the cutter: time, parts, distances, mismatch of seams, density of nesting, pages.
 
 Distances are per cent of each design's diagonal, the largest of all; mismatch is in millimetres.
 The designs are the teapot's 32 patches, a hemisphere of 12 gores, the terrain, 200 facade panels.
@@ -6,12 +6,14 @@ The designs are the teapot's 32 patches, a hemisphere of 12 gores, the terrain, 
 
 from __future__ import annotations
 
+import re
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import example, progress, quietly, tabulate, timed
+from harness import ROOT, example, progress, quietly, tabulate, timed
 
 import gso
 from gso.mesh import Mesh
@@ -23,6 +25,17 @@ _SETS = {
     "terrain": ("m", None, 0.5),
     "facade": ("mm", (3000.0, 1500.0), 1.0),
 }
+#: What a page does in each frame, and a script that counts frames in a second.
+_MOVES = {"turn": "stage.turn(0.02, 0)", "fold": "stage.move(0.5 + 0.5 * Math.cos(0.1 * k), 0)"}
+_FRAMES = """(async () => {
+  const { stage } = gsoPage.viewer;
+  const frame = () => new Promise(requestAnimationFrame);
+  await frame();
+  const start = performance.now();
+  let k = 0;
+  while (performance.now() - start < 4000) { %s; k += 1; await frame(); }
+  return (1000 * k) / (performance.now() - start);
+})()"""
 
 
 def fabricate(names: str = ",".join(_SETS), seconds: str = "30") -> dict[str, Any]:
@@ -63,4 +76,35 @@ def _designs(name: str, folder: Path) -> list[Mesh | Path]:
     return [gso.as_mesh(grid) for grid in grids]
 
 
-SECTIONS = (fabricate,)
+def page(rows: str = "15", columns: str = "20", fine: str = "8") -> dict[str, Any]:
+    """Measure the page of a vault of many parts: its size in kB, and frames per second.
+
+    The frames are those of Chromium while the parts turn and while they fold, where it is
+    installed and ``GSO_BROWSER=1`` asks for it. Code and geometry are compressed.
+    """
+    sys.path.insert(0, str(ROOT))
+    from tests.browser import PROGRAM, Browser
+    from tests.page_designs import html_of, vault
+
+    html, took = timed(html_of, *vault(int(rows), int(columns), int(fine)))
+    packed = dict(re.findall(r'id="page-(\w+)">([^<]*)</script>', html))
+    style = sum(map(len, re.findall("<style>.*?</style>", html)))
+    code, shapes = len(packed["script"]) + style, len(packed["arrays"])
+    row = {
+        "parts": int(rows) * int(columns),
+        "kB": len(html) / 1000,
+        "code": code / 1000,
+        "geometry": shapes / 1000,
+        "rest": (len(html) - code - shapes) / 1000,
+        "s": took,
+    }
+    if PROGRAM is not None:
+        with tempfile.TemporaryDirectory() as folder, Browser() as browser:
+            place = Path(folder, "page.html")
+            place.write_text(html, encoding="utf-8")
+            browser.open(place)
+            row |= {f"{name} 1/s": browser.run(_FRAMES % step) for name, step in _MOVES.items()}
+    return tabulate("page", ["design"], {"vault": row})
+
+
+SECTIONS = (fabricate, page)

@@ -72,6 +72,7 @@ from gso.errors import OptionError
     "--suffix", metavar=".EXT", help="Format of many outputs; that of each input by default."
 )
 @shared.plot
+@shared.page
 @shared.table
 @shared.unit
 @file_options.weld
@@ -94,6 +95,10 @@ def optimize(names: tuple[str, ...], out: str, as_json: bool, **given: Any) -> N
     if len(names) > 1 or os.path.isdir(out) or out.endswith(("/", os.sep)):
         from gso.cli.many_files import many
 
+        if given["page"] is not None:
+            raise OptionError(
+                "--page is for one input; gso view makes the page of each .npz of several results"
+            )
         spread = ("suffix", "plot", "table", "workers", "scheduler")
         good = many(job, names, out, as_json=as_json, **{k: given[k] for k in spread})
     else:
@@ -101,7 +106,8 @@ def optimize(names: tuple[str, ...], out: str, as_json: bool, **given: Any) -> N
             raise OptionError("--suffix is for many inputs; name the format in -o")
         if given["scheduler"] is not None:
             raise OptionError("--scheduler is for many inputs; leave it out")
-        good = single(job, names[0], out, given["plot"], given["table"], as_json)
+        files = {k: given[k] for k in ("plot", "page", "table")}
+        good = single(job, names[0], out, **files, as_json=as_json)
     click.get_current_context().exit(0 if good else 1)
 
 

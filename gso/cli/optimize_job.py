@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from gso import tasks
 from gso.cli import shared_options as shared
 from gso.cli.file_options import here, source, spare
+from gso.cli.page_file import PAGES
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -104,12 +105,19 @@ class Job:
         """The task, by name."""
         return str(self.keywords["task"])
 
-    def check(self, out: str, plot: str | None = None) -> None:
+    def check(self, out: str, plot: str | None = None, page: str | None = None) -> None:
         """Raise an error if an output cannot be written, before anything is computed."""
         from gso import io
 
+        has_pattern = self.task == "developable" or tasks.get(self.task).flat
+        if page is not None:
+            io.check_writable(page, PAGES)
+            if not has_pattern:
+                raise OptionError(
+                    f"{page}: pages show flat patterns; use --task flatten or --task developable"
+                )
         if out.lower().endswith(".svg"):
-            if self.task != "developable" and not tasks.get(self.task).flat:
+            if not has_pattern:
                 raise OptionError(
                     f"{out}: only a flat pattern is drawn as SVG; use --task flatten or "
                     "--task developable"

@@ -10,10 +10,14 @@ import click
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.commands import Command
+from gso.cli.page_file import write_page
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
     from gso.seams import Segmentation
+
+#: Name of the page in the folder.
+PAGE = "index.html"
 
 
 @click.command(
@@ -25,7 +29,7 @@ if TYPE_CHECKING:
 @click.argument("name", metavar="IN", type=click.Path())
 @shared.output(
     "Folder to write to: the pieces as groups of an OBJ file, their patterns at 1:1 (SVG), a "
-    "picture, and the table (JSON).",
+    "picture, the table (JSON), and index.html, a page to look at.",
     "folder",
     "DIR",
 )
@@ -89,7 +93,7 @@ def pieces(
     given["denoise"] = "auto" if denoise_auto else denoise
     if os.path.isfile(folder):
         raise OptionError(f"{folder} is a file; -o names a folder")
-    outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json")]
+    outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json", PAGE)]
     file_options.spare([name, along, avoid], outputs, force)
     mesh = file_options.source(name, weld)
     given |= {
@@ -104,6 +108,8 @@ def pieces(
             plot.plot_pieces(found, os.path.join(folder, "pieces.png"))
         except ImportError as error:
             click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
+    if found.known_pattern is not None:
+        write_page(found, name, os.path.join(folder, PAGE), given["unit"])
     if as_json:
         shared.tell_json(record(found, given["unit"]))
     else:

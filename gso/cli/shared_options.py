@@ -241,6 +241,13 @@ plot = click.option(
     help="Picture to draw (.png, .pdf, .svg).",
 )
 
+page = click.option(
+    "--page",
+    metavar="HTML",
+    type=click.Path(),
+    help="Page to look at in a browser (.html): it turns, and folds from the flat patterns.",
+)
+
 
 def _writable(ctx: click.Context, option: click.Parameter, value: str | None) -> str | None:
     """Refuse a file that cannot be written, before anything is computed."""

@@ -87,6 +87,7 @@ class _StripsJob(Job):
 @shared.sheet
 @shared.workers
 @shared.plot
+@shared.page
 @shared.table
 @shared.unit
 @file_options.weld
@@ -99,6 +100,7 @@ def strips(
     out: str,
     as_json: bool,
     plot: str | None,
+    page: str | None,
     table: str | None,
     constraints: str | None,
     **given: Any,
@@ -128,4 +130,5 @@ def strips(
         said = f"--{option.replace('_', '-')}"
         given[option] = file_options.lines(said, given[option])
     job = _StripsJob.of(given, own, *read)
-    click.get_current_context().exit(0 if single(job, name, out, plot, table, as_json) else 1)
+    good = single(job, name, out, plot=plot, page=page, table=table, as_json=as_json)
+    click.get_current_context().exit(0 if good else 1)

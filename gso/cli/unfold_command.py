@@ -10,6 +10,7 @@ import click
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.commands import Command
+from gso.cli.page_file import PAGES, write_page
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     metavar="A4",
     help="Pages of the PDF; without --sheet parts are divided so that each fits one if it can.",
 )
+@shared.page
 @shared.unit
 @shared.scale
 @shared.height
@@ -70,6 +72,7 @@ def unfold(
     tabs: float | None,
     numbers: str | None,
     paper: str | None,
+    page: str | None,
     unit: str,
     scale: float | None,
     height: str | float | None,
@@ -86,6 +89,7 @@ def unfold(
     """
     import numpy as np
 
+    from gso import io
     from gso.quantities import millimetres
     from gso.seams import Labels
     from gso.unfolding import unfold as make
@@ -94,9 +98,11 @@ def unfold(
     from gso.workshop.writers.pdf import SUFFIX, room
 
     writer = writers.check_output(out)
+    if page is not None:
+        io.check_writable(page, PAGES)
     if paper is not None and writer.SUFFIX != SUFFIX:
         raise OptionError(f"--paper {paper} needs an output whose name ends in {SUFFIX}")
-    file_options.spare([name], [out], force)
+    file_options.spare([name], [out, page], force)
     finish = Finish(notches=None, tabs=tabs, numbers=numbers)
     edges = np.array(cut, np.int64).reshape(-1, 2)
     mesh = file_options.source(name, weld)
@@ -129,6 +135,8 @@ def unfold(
     parts = of_net(spelled(Path(name).stem), net)
     drawing, bare = drawn([parts], millimetres(unit), finish)
     writers.write(drawing, out, **options)
+    if page is not None:
+        write_page(net, name, page, unit, finish=finish)
     if as_json:
         shared.tell_json(record(net, unit) | {"output": out, "notes": bare})
     elif not quiet:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.commands import Command
+from gso.cli.page_file import PAGES, write_page
 
 
 @click.command(
@@ -25,15 +24,14 @@ from gso.cli.commands import Command
 def view(file: str, out: str, unit: str, force: bool, quiet: bool) -> None:
     """Show the result FILE, .npz of gso optimize or gso strips, as a page for a browser.
 
-    The page turns, folds and explodes the patterns, and works without a network.
+    The page turns, folds and explodes the patterns, and works without a network. gso optimize,
+    gso strips and gso unfold write it with --page, gso pieces and gso fabricate in their folders.
     """
     from gso import io
-    from gso.io.atomic import write_bytes
     from gso.result import Result
-    from gso.workshop.result_page import result_page
 
-    io.check_writable(out, (".html",))
+    io.check_writable(out, PAGES)
     file_options.spare([file], [out], force)
-    write_bytes(out, result_page(Result.load(file), Path(file).stem, unit=unit).encode())
+    write_page(Result.load(file), file, out, unit)
     if not quiet:
         click.echo(f"page to look at: {out}")

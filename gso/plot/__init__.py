@@ -25,12 +25,13 @@ from gso.mesh.view import GRAZING, View
 from gso.pattern import Pattern
 from gso.plot.draw import SUFFIXES, Panel, available, draw, facing, require, turned, write
 from gso.plot.heat import Heat, Scale, curvatures, distance, numbers, scales, strain, stretch
-from gso.plot.picture_panels import gauss, pieces, ruled, strips
+from gso.plot.picture_panels import gauss, net, pieces, ruled, strips
 from gso.result import Result
 from gso.ruled.ruled_surface import RuledSurface
 from gso.seams import Segmentation
 from gso.spelling import choices
 from gso.typing import AnyPath, MeshLike
+from gso.unfolding import Net
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -283,7 +284,7 @@ def plot_rulings(
 
 
 def picture(found: object) -> Figure | None:
-    """Draw a mesh, a result, pieces or a ruled surface, whatever it is; None for something else.
+    """Draw a mesh, a result, pieces, a net or a ruled surface; None for something else.
 
     Raises
     ------
@@ -299,6 +300,8 @@ def picture(found: object) -> Figure | None:
         return plot_result(found)
     if isinstance(found, Segmentation):
         return plot_pieces(found)
+    if isinstance(found, Net):
+        return draw(net(found))
     if isinstance(found, RuledSurface):
         return plot_surface(found.mesh)
     return plot_surface(found) if isinstance(found, Mesh) else None

@@ -14,6 +14,7 @@ from gso.ruled.ruled_surface import RuledSurface
 from gso.rulings import gauss_image, shape_operator, trace
 from gso.seams.segmentation import Segmentation, whole_pattern
 from gso.typing import Array, Ints
+from gso.unfolding import Net
 
 #: Pixels along a picture in which parts are looked for.
 _PIXELS = 300
@@ -119,6 +120,23 @@ def pieces(found: Segmentation) -> list[Panel]:
         sheet.title = "patterns (not at the same scale)"
         panels.append(sheet)
     return panels
+
+
+def net(found: Net) -> list[Panel]:
+    """Make panels of the surface of a net from both sides, and of its parts."""
+    mesh, flat = found.mesh, found.pattern.flat
+    view, tint = View.of(mesh), pale_colours(len(found))[found.part]
+    panels = []
+    for side, title in ((view, f"{len(found.cut_edges)} edges cut"), (view.behind, "from behind")):
+        panel = Panel(side.project(mesh.vertices), mesh.faces, title, tint=tint, light=GRAZING)
+        panel.lines = list(panel.points[found.cut_edges])
+        panels.append(panel)
+    size = mesh.frame.scale
+    points = np.pad((flat - flat.mean(axis=0)) / size, ((0, 0), (0, 1)))
+    sheet = Panel(points, found.pattern.faces, shaded=False, tint=tint)
+    sheet.title = f"{len(found)} part{'s' if len(found) > 1 else ''} with fold lines"
+    sheet.lines = list(points[found.folds.edges])
+    return [*panels, sheet]
 
 
 def _title(found: Segmentation) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from gso.errors import MeshError
+from gso.in_browser import show
 from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern
 from gso.short_repr import html_repr
@@ -126,6 +127,7 @@ class Result:
             self.pattern = Pattern.whole(self.design, self.flat)
 
     _repr_html_ = html_repr
+    show = show
 
     def __repr__(self) -> str:
         from gso.result.in_words import summary

@@ -8,6 +8,7 @@ import numpy as np
 
 from gso import parametrization
 from gso.cut_pieces import Pieces
+from gso.in_browser import show
 from gso.mesh import Mesh
 from gso.pattern import Bend, Folded, Pattern
 from gso.result import Result
@@ -71,14 +72,24 @@ class Segmentation(Pieces):
     @property
     def pattern(self) -> Pattern | None:
         """The patterns of all pieces as one, beside each other; None if one is missing."""
+        return None if None in self.sheets else self.known_pattern
+
+    @property
+    def known_pattern(self) -> Pattern | None:
+        """The same of the pieces that have a pattern; None if none has one.
+
+        It has the faces of these pieces only; its vertices are those of the mesh that is cut open.
+        """
+        own = {k: sheet.flat for k, sheet in enumerate(self.sheets) if sheet is not None}
+        if not own:
+            return None
         opened = self.opened
         flat = np.zeros((len(opened.vertex), 2))
-        sheets = [sheet.flat for sheet in self.sheets if sheet is not None]
-        if len(sheets) < len(self.sheets):
-            return None
-        for part, own in zip(self.parts, parametrization.beside(sheets), strict=True):
-            flat[part.vertices] = own
-        return Pattern(flat, opened.mesh.faces, opened.vertex, opened.seams)
+        for k, placed in zip(own, parametrization.beside([*own.values()]), strict=True):
+            flat[self.parts[k].vertices] = placed
+        faces = opened.mesh.faces[np.isin(self.of_face, [*own])]
+        seams = opened.seams[np.isin(self.sides, [*own]).all(axis=1)]
+        return Pattern(flat, faces, opened.vertex, seams)
 
     @property
     def unchanged(self) -> Mesh:
@@ -166,6 +177,7 @@ class Segmentation(Pieces):
         return save(self, folder, unit)
 
     _repr_html_ = html_repr
+    show = show
 
     def __repr__(self) -> str:
         said = f"{len(self)} pieces, seam {self.seam_length:.3g}"

@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from gso.in_browser import show
 from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern
+from gso.short_repr import html_repr
 from gso.typing import Array, Ints
 from gso.unfolding.dual_edges import dual_edges
 from gso.unfolding.folding import angles_at, frames, misfit, motions
@@ -47,6 +49,9 @@ class Net:
     folded: Folded
     flat_angle: float = 0.0
     notes: tuple[str, ...] = ()
+
+    _repr_html_ = html_repr
+    show = show
 
     def __len__(self) -> int:
         return int(self.part.max()) + 1

@@ -27,7 +27,7 @@ from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.pattern_drawing import drawn
-from gso.workshop.pattern_panels import of_net, of_surface
+from gso.workshop.pattern_panels import of_net, of_pieces, of_surface
 from gso.workshop.tabs import TabSeam, with_tabs, without_tabs
 from gso.workshop.thickness import Thickness, thickened
 from gso.workshop.traced_guides import guide_lines
@@ -60,6 +60,7 @@ __all__ = [
     "name_place",
     "nest",
     "of_net",
+    "of_pieces",
     "of_surface",
     "order_of_joining",
     "origins",

@@ -7,16 +7,16 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from xml.etree.ElementTree import SubElement, tostring
+from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
 from gso import geometry
 from gso.geometry.polygon import arc_lengths
-from gso.io.svg_page import SVGPage
 from gso.mesh import Mesh
 from gso.mesh.view import GRAZING, View, lit, pale_colours
 from gso.typing import Array, Flags, Ints
+from gso.workshop.page_svg import PageSVG
 from gso.workshop.panels import Made, Mating, Panel
 
 #: Size of a picture and the height of its capital letters, in pixels.
@@ -30,6 +30,8 @@ _DARK = 0.45
 _DEGREES = 24
 #: Least distance between the numbers of seams and other texts, in pixels.
 _APART = 12.0
+#: Distance in pixels from lines that points on them may have.
+_STRAIGHT = 0.2
 #: Colour of outlines in the image of the faces.
 _EDGE = (110, 110, 108)
 
@@ -74,33 +76,54 @@ class Picture:
     lines: dict[str, Array]
     names: tuple[Name, ...] = ()
 
-    def svg(self, link: Callable[[str], str] = lambda title: "", name: str = "") -> str:
-        """Return it as an SVG element.
+    def svg(
+        self,
+        link: Callable[[str], str] = lambda title: "",
+        name: str = "",
+        before: tuple[str, Picture] | None = None,
+    ) -> str:
+        """Return it as an SVG element of the page.
 
-        `link` gives the addresses of names, empty for none; `name` is the identifier of the group
-        of all but the names, which other pictures may repeat.
+        Parameters
+        ----------
+        link : callable
+            Gives the addresses of names, empty for none.
+        name : str
+            Identifier of the image of the faces, which other pictures may repeat.
+        before : (str, Picture), optional
+            A picture of the same view on the same page, with its `name`: only what differs from
+            its faces is stored.
         """
-        page = SVGPage(np.zeros(2), np.array(self.size), digits=4)
-        width, height = (f"{side:.5g}" for side in self.size)
-        for unused in ("width", "height"):
-            del page.root.attrib[unused]
-        page.root.attrib |= {"class": "picture", "style": f"--w:{self.size[0]:.0f}"}
-        source = f"data:image/png;base64,{base64.b64encode(self.png()).decode()}"
+        page = PageSVG(np.zeros(2), np.array(self.size), "picture")
+        page.root.set("style", f"--w:{self.size[0]:.0f}")
         faces = SubElement(page.root, "g", {"id": name} if name else {})
-        SubElement(faces, "image", {"href": source, "width": width, "height": height})
+        # Pixels from the left, the top, the right and the bottom.
+        sides, image = (0, 0, *self.image.shape[1::-1]), self.image
+        if before is not None:
+            SubElement(faces, "use", {"href": f"#{before[0]}"})
+            sides, image = _changed(before[1].image, image)
+        if image.size:
+            wide, high = sides[2] - sides[0], sides[3] - sides[1]
+            look = dict(zip(("x", "y", "width", "height"), (*sides[:2], wide, high), strict=True))
+            places = {key: f"{side / _FINE:g}" for key, side in look.items() if side}
+            SubElement(faces, "image", {"href": _source(image)} | places)
         for kind, lines in self.lines.items():
-            page.path(faces, lines, kind=kind)
+            page.path(page.root, _chains(lines), kind=kind)
         for own in self.names:
             address = link(own.title)
             target = SubElement(page.root, "a", {"href": address} if address else {})
             target.set("class", f"{own.kind}-name")
             SubElement(target, "title").text = own.title
             page.text(target, own.text, own.at, TALL)
-        return tostring(page.root, "unicode")
+        return page.text_of()
 
     def png(self) -> bytes:
         """Return the image of the faces as a PNG file."""
         return _png(self.image)
+
+    def source(self) -> str:
+        """Return the same as the address of an image in HTML."""
+        return _source(self.image)
 
 
 class Stage:
@@ -247,19 +270,27 @@ class Stage:
 
 def here(picture: Picture, name: str, loops: Sequence[Array]) -> str:
     """Draw the place of a panel, by outlines (k, 2), on a picture with an identifier."""
-    page = SVGPage(np.zeros(2), np.array(picture.size), digits=4)
-    for unused in ("width", "height"):
-        del page.root.attrib[unused]
-    page.root.set("class", "place")
+    import shapely
+
+    page = PageSVG(np.zeros(2), np.array(picture.size), "place")
     SubElement(page.root, "use", {"href": f"#{name}"})
-    page.path(page.root, loops, closed=True, kind="here")
-    return tostring(page.root, "unicode")
+    rings = shapely.simplify([shapely.LinearRing(loop) for loop in loops], _STRAIGHT)
+    drawn = [shapely.get_coordinates(ring)[:-1] for ring in rings]
+    page.path(page.root, drawn, closed=True, kind="here")
+    return page.text_of()
 
 
 def sides(panels: Sequence[Panel]) -> tuple[View, View]:
     """Return the views of panels from the front and from behind."""
     front = View.of(_joined([panel.surface for panel in panels]))
     return front, front.behind
+
+
+def front(made: Made) -> Picture:
+    """Return the picture of a design's panels in their places from the front."""
+    stage = Stage(made, sides(made.panels)[0])
+    stage.add(range(len(made.panels)))
+    return stage.picture(pale_colours(len(made.panels)))
 
 
 class Places:
@@ -374,6 +405,43 @@ def _tones(corners: Array, colours: Array, fine: bool = True) -> np.ndarray:
     return np.asarray(np.round(255.0 * colours * bright[:, None]).astype(np.uint8))
 
 
+def _chains(segments: Array) -> list[Array]:
+    """Join segments (k, 2, 2) that meet to lines, each drawn once, without points in between."""
+    import shapely
+
+    ends = np.round(segments, 1)
+    back = np.lexsort(ends.transpose(2, 0, 1)[::-1], axis=-1)[:, 0] == 1
+    ends[back] = ends[back][:, ::-1]
+    ends = np.unique(ends[(ends[:, 0] != ends[:, 1]).any(axis=1)], axis=0)
+    if not len(ends):
+        return []
+    joined = shapely.line_merge(shapely.multilinestrings(shapely.linestrings(ends)))
+    lines = shapely.simplify(shapely.get_parts(joined), _STRAIGHT)
+    return [shapely.get_coordinates(line) for line in lines]
+
+
+def _changed(before: np.ndarray, image: np.ndarray) -> tuple[tuple[int, ...], np.ndarray]:
+    """Return the part of an image that differs from an earlier one, and its sides in pixels.
+
+    What is the same is white. Pixels around what differs are kept, so that nothing shines through
+    where the image is scaled.
+    """
+    own = np.pad((before != image).any(axis=2), 1)
+    near = own[1:-1, 1:-1] | own[:-2, 1:-1] | own[2:, 1:-1] | own[1:-1, :-2] | own[1:-1, 2:]
+    rows, columns = (np.flatnonzero(near.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return (0, 0, 0, 0), image[:0]
+    top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+    cut = (slice(top, bottom), slice(left, right))
+    kept = np.where(near[cut][..., None], image[cut], np.uint8(255))
+    return (int(left), int(top), int(right), int(bottom)), kept
+
+
+def _source(image: np.ndarray) -> str:
+    """Return an image as an address in HTML."""
+    return f"data:image/png;base64,{base64.b64encode(_png(image)).decode()}"
+
+
 def _png(image: np.ndarray) -> bytes:
     """Return an image (rows, columns, 3) of bytes as a PNG file."""
 
@@ -389,10 +457,10 @@ def _png(image: np.ndarray) -> bytes:
     pixels = index.reshape(rows, columns).astype(np.uint8) if few else image.reshape(rows, -1)
     lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
     parts = [(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 3 if few else 2, 0, 0, 0))]
-    # White, the last of the sorted colours, is transparent: what has no face shows the page.
+    # White is transparent: what has no face shows the page.
     if few:
         parts.append((b"PLTE", b"".join(int(c).to_bytes(3, "big") for c in colours)))
-        parts.append((b"tRNS", b"\xff" * (len(colours) - 1) + b"\x00"))
+        parts.append((b"tRNS", bytes(0 if c == 0xFFFFFF else 255 for c in colours.tolist())))
     else:
         parts.append((b"tRNS", b"\x00\xff" * 3))
     parts += [(b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from gso.constraints import Constraint, listed, record_of
 from gso.errors import OptionError
 from gso.exact import EXACT, as_it_is
+from gso.in_browser import in_notebook, open_file, picture
 from gso.io import SPLINE_SUFFIXES, Solid, suffix_of
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
@@ -31,6 +33,7 @@ from gso.short_repr import short_repr
 from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
 from gso.wording import logged, places
+from gso.workshop.assembly_view import front
 from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
@@ -38,7 +41,7 @@ from gso.workshop.constrained import check_formulation
 from gso.workshop.designs import Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
-from gso.workshop.job_folder import CERTIFICATE, SOLIDS, WORK, opened, path_of
+from gso.workshop.job_folder import CERTIFICATE, PAGE, SOLIDS, WORK, opened, path_of
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
@@ -70,6 +73,8 @@ class Fabrication:
         What ``certificate.json`` has.
     files : tuple of str
         Names of the files, relative to the folder.
+    shown : tuple of Shown
+        What was made of the designs, as the page shows it.
     """
 
     folder: Path
@@ -77,8 +82,29 @@ class Fabrication:
     sheets: tuple[Drawing, ...]
     certificate: Json
     files: tuple[str, ...] = field(default=())
+    shown: tuple[Shown, ...] = field(default=(), repr=False)
 
     __repr__ = short_repr
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the representation, and the first design from the front."""
+        return f"<pre>{escape(repr(self))}</pre>" + "".join(
+            f'<img style="max-width: 100%" src="{front(one.made).source()}" alt="">'
+            for one in self.shown[:1]
+        )
+
+    def show(self) -> None:
+        """Open the page in a browser; in a notebook, show a picture of the first design.
+
+        Raises
+        ------
+        GSOError
+            There is no browser.
+        """
+        if in_notebook():
+            picture(self)
+        else:
+            open_file(self.folder / PAGE)
 
     @property
     def usable(self) -> bool:
@@ -432,7 +458,7 @@ def fabricate(
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)
-    return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files))
+    return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files), tuple(shown))
 
 
 def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:

@@ -7,6 +7,9 @@ moves.
 
 from __future__ import annotations
 
+import base64
+import json
+import zlib
 from collections.abc import Callable, Sequence
 from html import escape
 from importlib.resources import files
@@ -16,7 +19,7 @@ from gso.wording import listed, places
 from gso.workshop.page_data import data_for_page
 from gso.workshop.page_drawings import part_drawing, sheet_drawing
 from gso.workshop.page_tables import designs_table, parts_table, seams_table
-from gso.workshop.page_text import addresses, guided, in_script, mm
+from gso.workshop.page_text import addresses, guided, mm
 from gso.workshop.page_views import Views, assembly_sheet, place_picture, whole_pictures
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers.layers import layer_set
@@ -74,9 +77,10 @@ def page_html(
         *_section("designs", "Designs", [designs_table(certificate["designs"])]),
         *(f"<p>{escape(note)}</p>" for note in certificate["notes"]),
         "</main>",
-        f'<script type="application/json" id="page-data">{in_script(data)}</script>',
-        f'<script type="text/plain" id="page-arrays">{arrays}</script>',
-        f"<script>{_file('page.js')}</script>",
+        _packed("page-data", json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
+        _packed("page-arrays", base64.b64decode(arrays)),
+        _packed("page-script", _file("page.js").encode()),
+        f"<script>{_file('boot.js')}</script>",
         "</body></html>",
     ]
     return "\n".join(lines) + "\n"
@@ -84,6 +88,12 @@ def page_html(
 
 def _file(name: str) -> str:
     return (files("gso.workshop") / "web" / name).read_text("utf-8").strip()
+
+
+def _packed(name: str, data: bytes) -> str:
+    """Return data for the script of the page: compressed, as base64."""
+    code = base64.b64encode(zlib.compress(data, 9)).decode()
+    return f'<script type="text/plain" id="{name}">{code}</script>'
 
 
 def _section(name: str, title: str, lines: Sequence[str]) -> list[str]:

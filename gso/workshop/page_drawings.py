@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from gso.geometry.rigid import closest_motion
-from gso.io.svg_page import SVGPage
 from gso.typing import Array
 from gso.workshop.name_places import name_place
+from gso.workshop.page_svg import PageSVG
 from gso.workshop.part import Drawing, Label, Part
 from gso.workshop.writers import strokes
 
@@ -37,13 +37,11 @@ def part_drawing(part: Part, number: int) -> str:
     low, high = Drawing((part,)).bounds
     size = float(np.maximum(high - low, 1e-9).max())
     room = _ROOM * size
-    page = SVGPage(low - room, high + room, digits=6)
-    wide, tall = (high - low + 2 * room).tolist()
+    page = PageSVG(low - room, high + room, "drawing")
     root = page.root
-    for name in ("width", "height"):
-        del root.attrib[name]
-    root.attrib |= {"class": "drawing", "data-part": str(number)}
-    root.set("style", f"--w:{wide:.6g};--h:{tall:.6g}")
+    root.set("data-part", str(number))
+    _, _, wide, tall = root.attrib["viewBox"].split()
+    root.set("style", f"--w:{wide};--h:{tall}")
     lines = SubElement(root, "g", {"id": f"lines-{number}"})
     every = strokes.lines(part)
     page.path(
@@ -62,7 +60,7 @@ def part_drawing(part: Part, number: int) -> str:
             lines[-1].set("data-bend", str(drawn[id(line.bend)]))
     _notches(page, lines, part, size)
     _name(page, root, part, size)
-    return tostring(root, "unicode")
+    return page.text_of()
 
 
 def sheet_drawing(drawing: Drawing, parts: Sequence[Part]) -> str:
@@ -77,11 +75,8 @@ def sheet_drawing(drawing: Drawing, parts: Sequence[Part]) -> str:
     low, high = drawing.bounds
     size = float((high - low).max())
     room = 0.3 * _ROOM * size
-    page = SVGPage(low - room, high + room, digits=6)
+    page = PageSVG(low - room, high + room, "sheet-drawing")
     root = page.root
-    for name in ("width", "height"):
-        del root.attrib[name]
-    root.set("class", "sheet-drawing")
     for border in strokes.sheet(drawing):
         page.path(root, [border.points], closed=True, kind="sheet")
     number = {part.name: k for k, part in enumerate(parts)}
@@ -102,16 +97,17 @@ def sheet_drawing(drawing: Drawing, parts: Sequence[Part]) -> str:
         matrix = " ".join(f"{x:.7g}" for x in cells)
         SubElement(group, "use", {"href": f"#lines-{k}", "transform": f"matrix({matrix})"})
         _name(page, group, placed, size, _ON_SHEET)
-    return tostring(root, "unicode")
+    return page.text_of()
 
 
 def _closed(line: strokes.Line) -> Array:
     return np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
 
 
-def _notches(page: SVGPage, lines: Element, part: Part, size: float) -> None:
+def _notches(page: PageSVG, lines: Element, part: Part, size: float) -> None:
     """Draw notches, and the text of each mark beside one of its notches."""
     marks: dict[str, Element] = {}
+    drawn: dict[str, list[Array]] = {}
     texts: dict[str, Label] = {}
     for label in strokes.texts(part):
         texts.setdefault(label.text, label)
@@ -123,10 +119,12 @@ def _notches(page: SVGPage, lines: Element, part: Part, size: float) -> None:
                 at = texts[text]
                 page.text(marks[text], text, at.start, max(at.height, 0.6 * _NOTCH * size))
         end = notch.at + max(_NOTCH * size, 1e-9) * notch.inward
-        page.path(marks[text], [np.stack([notch.at, end])])
+        drawn.setdefault(text, []).append(np.stack([notch.at, end]))
+    for text, own in drawn.items():
+        page.path(marks[text], own)
 
 
-def _name(page: SVGPage, parent: Element, part: Part, size: float, share: float = _NAME) -> None:
+def _name(page: PageSVG, parent: Element, part: Part, size: float, share: float = _NAME) -> None:
     """Write the name where it lies inside the part, off bend lines where there is room."""
     text = strokes.printable(part.name)
     middle, high, angle = name_place(part, text, share * size)

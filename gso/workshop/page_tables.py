@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 
@@ -66,7 +67,7 @@ def seams_table(views: Views, address: Callable[[str], str]) -> str:
                 f"{abs(angle):.1f} {'down' if angle > 0 else 'up'}" if np.isfinite(angle) else "-",
                 small_mm(seam.mismatch(one.panels)),
             ]
-            rows.append((f' data-seam="{len(rows)}" tabindex="0"', cells))
+            rows.append((f' data-seam="{len(rows)}"', cells))
     return _table(heads, rows, "seams") if rows else ""
 
 
@@ -101,8 +102,14 @@ def _table(heads: Sequence[str], rows: Sequence[tuple[str, list[str]]], kind: st
     lines = [f'<div class="wide"><table class="sortable {kind}"><thead><tr>']
     lines += [f"<th>{head(words)}</th>" for words in heads]
     lines.append("</tr></thead><tbody>")
-    lines += [f"<tr{more}>{''.join(f'<td>{c}</td>' for c in cells)}</tr>" for more, cells in rows]
+    lines += [f"<tr{more}>{''.join(map(_cell, cells))}</tr>" for more, cells in rows]
     return "".join([*lines, "</tbody></table></div>"])
+
+
+def _cell(content: str) -> str:
+    """Return a cell; one that is a length or an area has the number itself."""
+    alone = re.fullmatch(r"<span (data-mm[^>]*)>([^<]*)</span>", content)
+    return f"<td>{content}</td>" if alone is None else f"<td {alone[1]}>{alone[2]}</td>"
 
 
 def _linked(name: str, address: Callable[[str], str]) -> str:

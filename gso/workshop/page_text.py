@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from html import escape
 
@@ -15,15 +14,6 @@ from gso.workshop.writers import strokes
 #: Least number but 0 that is written.
 _LEAST = 0.001
 _UNITS = {"mm2": "mm²", "mm": "mm"}
-
-
-def in_script(data: object) -> str:
-    r"""Return data as JSON that may stand in an element ``script`` of HTML.
-
-    >>> in_script({"name": "</script><!--"})
-    '{"name":"\\u003c/script>\\u003c!--"}'
-    """
-    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def mm(value: float | None) -> str:

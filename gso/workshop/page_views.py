@@ -115,9 +115,11 @@ def whole_pictures(views: Views, address: Callable[[str], str]) -> list[str]:
 def assembly_sheet(views: Views, address: Callable[[str], str]) -> list[str]:
     """Return the pictures of the order in which the parts of each design are joined."""
     lines = []
-    for one, own in zip(views.shown, views.steps, strict=False):
+    for design, (one, own) in enumerate(zip(views.shown, views.steps, strict=False)):
         if not own:
             continue
+        # The last picture of each side.
+        last: dict[bool, tuple[str, Picture]] = {}
         lines.append(f'<h3>{escape(one.made.name)}: order of joining</h3><ol class="steps">')
         for shot in own:
             said = "".join(
@@ -125,6 +127,9 @@ def assembly_sheet(views: Views, address: Callable[[str], str]) -> list[str]:
                 for k, step in enumerate(shot.steps)
             )
             side = "<p>from behind</p>" if shot.is_behind else ""
-            lines.append(f"<li>{shot.picture.svg(address)}{side}<ol>{said}</ol></li>")
+            name = f"step-{design}-{shot.first}"
+            drawn = shot.picture.svg(address, name, last.get(shot.is_behind))
+            last[shot.is_behind] = name, shot.picture
+            lines.append(f"<li>{drawn}{side}<ol>{said}</ol></li>")
         lines.append("</ol>")
     return lines

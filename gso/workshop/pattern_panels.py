@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso import tasks
 from gso.components import largest_first
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.mesh.topology import pair_keys
 from gso.pattern import Folded, Pattern, Zone
 from gso.result import Result
+from gso.seams import Segmentation
 from gso.typing import Array, Ints, Json
 from gso.unfolding import Net
 from gso.workshop.matings import across, numbered, of_pattern
@@ -72,7 +74,7 @@ def _with_zones(panel: Panel, zones: Sequence[Zone]) -> Panel:
 
 def of_result(name: str, result: Result, record: Json) -> Made:
     """Divide a result into panels with bend lines; of piece A of several they are NAME-A-1 etc."""
-    pattern, points, pieces = result.pattern, result.mesh.vertices, result.pieces
+    pattern, points, pieces = result.pattern, surface_of(result).vertices, result.pieces
     if pattern is None:
         raise MeshError(f"{name}: there is no pattern")
     panels, label, local = _divided(points, pattern, result.folded)
@@ -87,6 +89,25 @@ def of_result(name: str, result: Result, record: Json) -> Made:
         if len(pieces) > 1:
             names = [f"{name}-{pieces.name(k)}" for k in owner]
     return Made(name, _named(panels, names), numbered(matings), record)
+
+
+def surface_of(result: Result) -> Mesh:
+    """Return the surface that the pattern of a result belongs to."""
+    return result.design if tasks.get(result.task).flat else result.mesh
+
+
+def of_pieces(name: str, found: Segmentation, record: Json) -> Made:
+    """Make a panel of each piece that has a pattern; that of piece A of several is NAME-A."""
+    pattern, points = found.known_pattern, found.design.vertices
+    if pattern is None:
+        raise MeshError(f"{name}: none of the pieces has a pattern, so that no page shows them")
+    folded = found.folded
+    panels, label, local = _divided(points, pattern, folded)
+    matings = of_pattern(points, pattern, label, local, len(folded.edges) > 0)
+    first = [np.flatnonzero(label == k)[0] for k in range(len(panels))]
+    owner = found.of_vertex[first].tolist()
+    names = [f"{name}-{found.name(k)}" if len(found) > 1 else name for k in owner]
+    return Made(name, _named(panels, names), numbered(matings), record, found.reasons)
 
 
 def _named(panels: list[Panel], names: list[str]) -> tuple[Panel, ...]:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from gso import metrics
+from gso.mesh import Mesh
 from gso.quantities import millimetres
 from gso.result import Result
+from gso.seams import Segmentation
 from gso.typing import Json
+from gso.unfolding import Net
 from gso.verdict import ordered
 from gso.workshop.certificate import design_record
 from gso.workshop.finish import Finish
@@ -13,21 +18,31 @@ from gso.workshop.names import spelled
 from gso.workshop.page import page_html
 from gso.workshop.page_data import Shown
 from gso.workshop.page_views import Views
+from gso.workshop.panels import Made
 from gso.workshop.parts import fitted, parts_from
-from gso.workshop.pattern_panels import of_result
+from gso.workshop.pattern_panels import of_net, of_pieces, of_result, surface_of
 
 
-def result_page(result: Result, name: str, *, unit: str = "mm") -> str:
-    """Return the page of a result with a flat pattern as HTML.
+def result_page(
+    found: Result | Segmentation | Net,
+    name: str,
+    *,
+    unit: str = "mm",
+    finish: Finish = Finish(),  # noqa: B008
+) -> str:
+    """Return the page of a result with flat patterns as HTML.
 
     Parameters
     ----------
-    result : Result
-        With a pattern, such as of :func:`gso.tno.optimize` or :func:`gso.strips`.
+    found : Result, Segmentation or Net
+        Of :func:`gso.tno.optimize` or :func:`gso.strips`, of :func:`gso.pieces`, or of
+        :func:`gso.unfold`.
     name : str
         What the design is called.
     unit : str
         Unit of its coordinates.
+    finish : Finish, optional
+        What the drawings of parts have: notches, numbers, tabs.
 
     Raises
     ------
@@ -46,28 +61,49 @@ def result_page(result: Result, name: str, *, unit: str = "mm") -> str:
     1
     """
     scale = millimetres(unit)
-    made = of_result(spelled(name), result, _record(result))
-    fit = fitted(made, scale, Finish())
-    parts, _ = parts_from(fit, Finish())
-    reasons = [reason.scaled(scale).record("mm") for reason in ordered(result.reasons)]
+    made, design, notes = _made(found, spelled(name))
+    fit = fitted(made, scale, finish)
+    parts, _ = parts_from(fit, finish)
+    reasons = [reason.scaled(scale).record("mm") for reason in ordered(made.reasons)]
     record = design_record(fit, parts, [made.name]) | {"reasons": reasons}
     for entry in record["parts"]:
         entry["same_as"] = None
     certificate: Json = {
         "usable": not reasons,
         "reasons": reasons,
-        "notes": list(result.notes),
+        "notes": list(notes),
         "designs": [record],
         "sheets": [],
     }
-    shown = [Shown(made, result.design, scale, fit.panels)]
+    shown = [Shown(made, design, scale, fit.panels)]
     return page_html(certificate, parts, [], Views(shown, certificate))
+
+
+def _made(found: Result | Segmentation | Net, name: str) -> tuple[Made, Mesh, tuple[str, ...]]:
+    """Return the panels of a result, the design that they are compared with, and notes."""
+    if isinstance(found, Net):
+        record: Json = {"area": float(found.areas.sum()), "deviation_max": 0.0}
+        return replace(of_net(name, found), record=record), found.mesh, found.notes
+    if isinstance(found, Segmentation):
+        # Without a change of shape no distance was measured.
+        said = {"deviation_mean": 0.0, "deviation_max": 0.0} | found.metrics
+        record = {k: said[k] for k in ("deviation_mean", "deviation_max", "strain_max")}
+        record["area"] = metrics.area(found.design)
+        return of_pieces(name, found, record), found.given or found.design, found.notes
+    made = of_result(name, found, _record(found))
+    return replace(made, reasons=found.reasons), found.design, found.notes
 
 
 def _record(result: Result) -> Json:
     """Return what the page says of a surface and its pattern, in the unit of the mesh."""
-    record: Json = {"area": metrics.area(result.mesh)}
+    surface = surface_of(result)
+    record: Json = {"area": metrics.area(surface)}
+    if surface is result.design:
+        record |= {"deviation_mean": 0.0, "deviation_max": 0.0}
+    else:
+        away = result.distances
+        record |= {"deviation_mean": away.mean, "deviation_max": away.largest}
     if result.pattern is not None:
-        sheet = result.pattern.surface(result.mesh)
+        sheet = result.pattern.surface(surface)
         record["strain_max"] = metrics.strains(sheet, result.pattern.flat)["strain_max"]
     return record

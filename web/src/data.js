@@ -2,15 +2,14 @@
 
 const MISSING = 65535;
 
-export function load() {
-  const text = (id) => document.getElementById(id).textContent;
-  const data = JSON.parse(text("page-data"));
-  const bytes = Uint8Array.from(atob(text("page-arrays").trim()), (c) => c.charCodeAt(0));
+export async function load() {
+  const data = await (await window.gsoUnpack("page-data")).json();
+  const buffer = await (await window.gsoUnpack("page-arrays")).arrayBuffer();
 
   // Coordinates and values; NaN where there is none.
   function numbers(entry) {
     const { at, count, columns, low, step } = entry;
-    const levels = new Uint16Array(bytes.buffer, at, count * columns);
+    const levels = new Uint16Array(buffer, at, count * columns);
     const out = new Float32Array(levels.length);
     for (let k = 0; k < levels.length; k++) {
       const column = k % columns;
@@ -21,7 +20,7 @@ export function load() {
 
   function indices(entry) {
     const Type = entry.bits === 16 ? Uint16Array : Uint32Array;
-    return new Type(bytes.buffer, entry.at, entry.count * entry.columns);
+    return new Type(buffer, entry.at, entry.count * entry.columns);
   }
 
   for (const design of data.designs) {

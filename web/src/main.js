@@ -6,8 +6,8 @@ import { sortable } from "./tables.js";
 import { setInches } from "./units.js";
 import { Viewer } from "./viewer.js";
 
-function start() {
-  const data = load();
+async function start() {
+  const data = await load();
   const place = document.getElementById("viewer");
   const state = { part: null, seam: null };
   const wide = document.createElement("div");
@@ -51,7 +51,7 @@ function start() {
   const details = new Details(data, beside, chooseSeam, (panel) => choosePart(panel));
 
   for (const table of document.querySelectorAll("table.sortable")) sortable(table);
-  for (const row of document.querySelectorAll("table.parts tbody tr")) row.tabIndex = 0;
+  for (const row of document.querySelectorAll("tr[data-part], tr[data-seam]")) row.tabIndex = 0;
   const act = (event) => {
     if (event.target.closest("a, button, .details")) return;
     const part = event.target.closest("[data-part]");

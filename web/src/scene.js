@@ -401,6 +401,31 @@ export class Stage {
     }
   }
 
+  // Where the numbers of seams stand, for each copy: the middle of a side, as a share along an edge.
+  get seamEnds() {
+    if (this.ends) return this.ends;
+    const { data } = this;
+    const own = data.panels.map(() => []);
+    for (const seam of data.seams)
+      seam.panels.forEach((panel, side) => own[panel].push([seam, ...nearestEdge(data.panels[panel], middleAlong(seam.line, side))]));
+    this.ends = this.copies.flatMap((copy, k) => own[copy.panel].map(([seam, a, b, s]) => ({ seam, copy, k, a, b, s, seen: false })));
+    return this.ends;
+  }
+
+  // The place of such an end; on the canvas (-1 to 1); and how far from the viewer it is.
+  endPoint({ copy, a, b, s }) {
+    const [one, two] = [a, b].map((v) => new Vector3().fromArray(this.points, 3 * (copy.first + v)));
+    return one.lerp(two, s);
+  }
+
+  endOnCanvas(end) {
+    return this.endPoint(end).project(this.camera);
+  }
+
+  farOf(end) {
+    return this.endPoint(end).distanceTo(this.camera.position);
+  }
+
   push(out, v) {
     out.push(this.points[3 * v], this.points[3 * v + 1], this.points[3 * v + 2]);
   }
@@ -542,6 +567,22 @@ function boxOf(every) {
       high[k % 3] = Math.max(high[k % 3], points[k]);
     }
   return Number.isFinite(low[0]) ? [low, high] : [[0, 0, 0], [1, 1, 1]];
+}
+
+// The point half-way along one side of a seam, whose line has the points of both.
+function middleAlong(line, side) {
+  const count = line.length / 6;
+  const point = (k) => line.subarray(3 * (side * count + k), 3 * (side * count + k) + 3);
+  const steps = [0];
+  for (let k = 1; k < count; k++) {
+    const [p, q] = [point(k - 1), point(k)];
+    steps.push(steps[k - 1] + Math.hypot(q[0] - p[0], q[1] - p[1], q[2] - p[2]));
+  }
+  const half = 0.5 * steps[count - 1];
+  const k = Math.max(steps.findIndex((x) => x >= half), 1);
+  const share = (half - steps[k - 1]) / (steps[k] - steps[k - 1] || 1);
+  const [p, q] = [point(k - 1), point(Math.min(k, count - 1))];
+  return [0, 1, 2].map((i) => p[i] + share * (q[i] - p[i]));
 }
 
 function nearestEdge(panel, p) {

@@ -21,7 +21,7 @@ export function sortable(table) {
 
 // Lengths sort by millimetres, whatever the unit that is shown.
 function key(cell) {
-  const length = cell.querySelector("[data-mm], [data-mm2]");
+  const length = [cell, ...cell.children].find((one) => one.matches("[data-mm], [data-mm2]"));
   if (length) return Number(length.dataset.mm ?? length.dataset.mm2);
   const text = cell.textContent.trim();
   const number = Number.parseFloat(text);

@@ -7,6 +7,12 @@ import { isInches, length, onUnit, plain, unitName, withUnit } from "./units.js"
 const INCH = 25.4;
 // Names that are drawn while something moves: those of the parts that are the largest on the screen.
 const MOVING = 80;
+// Ends of seams up to which all have their numbers; else those of the part that was chosen.
+const FEW = 60;
+// How far behind a face, relative to the size, the edge that it ends at may seem to be.
+const NEAR = 0.01;
+// Pixels from the border of what is seen of a part that a name should keep.
+const ROOM = 7;
 const LABELS = { deviation: "deviation", strain: "strain", curvature: "Gaussian curvature", bending: "bending" };
 
 const FRAME = `
@@ -29,6 +35,7 @@ const FRAME = `
     <i class="bar"></i><input type="number" name="high" step="any" aria-label="largest value"><span class="of"></span></span>
   <label><input type="checkbox" name="names" checked>names</label>
   <label><input type="checkbox" name="bends" checked>bends</label>
+  <label><input type="checkbox" name="seams" checked>seams</label>
   <label class="units"><input type="checkbox" name="inches">inch</label>
   <button type="button" name="home">reset view</button>
 </form>`;
@@ -105,7 +112,9 @@ export class Viewer {
         this.range();
         this.colour();
       });
-    own.names.addEventListener("change", () => this.label());
+    if (!this.data.seams.length) own.seams.closest("label").hidden = true;
+    own.names.addEventListener("change", () => this.settle());
+    own.seams.addEventListener("change", () => this.settle());
     own.bends.addEventListener("change", () => this.what());
     own.inches.addEventListener("change", () => setUnit(own.inches.checked));
     own.home.addEventListener("click", () => {
@@ -187,6 +196,7 @@ export class Viewer {
   }
 
   markSeam(seam) {
+    this.seam = seam;
     this.stage.markSeam(seam);
   }
 
@@ -304,14 +314,18 @@ export class Viewer {
       own[1] += Math.floor(at / wide);
       own[2] += 1;
     });
+    // Where there is room, and there as near to the middle as possible.
+    const room = roomAround(wide, owner);
     const best = new Map();
     owner.forEach((k, at) => {
       if (k < 0) return;
       const [x, y, n] = sums.get(k);
       if (n < 12) return;
       const away = Math.hypot((at % wide) - x / n, Math.floor(at / wide) - y / n);
-      if (away < (best.get(k)?.[0] ?? Infinity)) best.set(k, [away, at]);
+      const known = best.get(k);
+      if (!known || room[at] > known[2] || (room[at] === known[2] && away < known[0])) best.set(k, [away, at, room[at]]);
     });
+    this.findSeams(wide, high, owner);
     this.visible = new Map(
       [...best].map(([k, [, at]]) => [k, [((at % wide) + 0.5) / wide, 1 - (Math.floor(at / wide) + 0.5) / high, sums.get(k)[2]]]),
     );
@@ -330,8 +344,67 @@ export class Viewer {
     const pen = sheet.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, wide, high);
-    if (!this.form.elements.names.checked || !stage.surface.visible) return;
+    if (!stage.surface.visible) return;
     const taken = [];
+    // Beside the names of parts, or before them where a part or a seam was chosen.
+    const chosen = this.chosen !== null || Boolean(this.seam);
+    if (chosen) this.labelSeams(pen, taken, ratio);
+    if (this.form.elements.names.checked) this.labelParts(pen, taken, ratio);
+    if (!chosen) this.labelSeams(pen, taken, ratio);
+  }
+
+  // The seams whose numbers are shown.
+  seamsShown() {
+    const { data, stage } = this;
+    if (!this.form.elements.seams.checked) return [];
+    const all = this.chosen === null && !this.seam && stage.seamEnds.length <= FEW;
+    return stage.seamEnds.filter(
+      ({ seam, k }) =>
+        k < stage.shown &&
+        (all || seam === this.seam || (this.chosen !== null && seam.panels.some((panel) => data.panels[panel].part === this.chosen))),
+    );
+  }
+
+  // Tell which ends of seams are seen: their panel is within two pixels of them, and nothing in front.
+  findSeams(wide, high, owner) {
+    const { stage } = this;
+    for (const end of this.seamsShown()) {
+      const place = stage.endOnCanvas(end);
+      const [x, y] = [Math.floor(0.5 * (place.x + 1) * wide), Math.floor(0.5 * (place.y + 1) * high)];
+      end.seen = false;
+      for (let i = Math.max(x - 2, 0); i <= Math.min(x + 2, wide - 1); i++)
+        for (let j = Math.max(y - 2, 0); j <= Math.min(y + 2, high - 1); j++) end.seen ||= owner[j * wide + i] === end.k;
+      const first = end.seen && stage.pick(place.x, place.y);
+      if (first) end.seen = first.far > stage.farOf(end) - NEAR * stage.around.size;
+    }
+  }
+
+  labelSeams(pen, taken, ratio) {
+    const { sheet, stage } = this;
+    const numbers = [];
+    for (const end of this.seamsShown()) {
+      if (!end.seen) continue;
+      const place = stage.endOnCanvas(end);
+      const at = [0.5 * (place.x + 1) * sheet.clientWidth, 0.5 * (1 - place.y) * sheet.clientHeight];
+      // Both sides of a closed seam have one number.
+      if (numbers.some(([seam, x, y]) => seam === end.seam && Math.hypot(x - at[0], y - at[1]) < 24)) continue;
+      if (this.write(pen, taken, ratio, String(end.seam.number), at, "--number")) numbers.push([end.seam, ...at]);
+    }
+  }
+
+  // Write a text where there is room.
+  write(pen, taken, ratio, text, at, colour) {
+    const name = this.written(text, ratio, colour);
+    const half = 0.5 * name.text;
+    if (taken.some(([u, v, w]) => Math.abs(u - at[0]) < half + w + 2 && Math.abs(v - at[1]) < 13)) return false;
+    taken.push([...at, half]);
+    pen.drawImage(name.image, at[0] - 0.5 * name.wide, at[1] - 0.5 * name.high, name.wide, name.high);
+    return true;
+  }
+
+  labelParts(pen, taken, ratio) {
+    const { sheet, stage } = this;
+    const [wide, high] = [sheet.clientWidth, sheet.clientHeight];
     const order = [...this.visible].sort((a, b) => b[1][2] - a[1][2]).slice(0, this.still ? Infinity : MOVING);
     for (const [k, [x, y]] of order) {
       const copy = stage.copies[k];
@@ -341,17 +414,14 @@ export class Viewer {
         const place = stage.anchor(copy);
         at = [0.5 * (place.x + 1) * wide, 0.5 * (1 - place.y) * high];
       }
-      const name = this.written(text, ratio);
-      const half = 0.5 * name.text;
-      if (taken.some(([u, v, w]) => Math.abs(u - at[0]) < half + w + 2 && Math.abs(v - at[1]) < 13)) continue;
-      taken.push([...at, half]);
-      pen.drawImage(name.image, at[0] - 0.5 * name.wide, at[1] - 0.5 * name.high, name.wide, name.high);
+      this.write(pen, taken, ratio, text, at, "--on-part");
     }
   }
 
   // A name with a halo, drawn once: this takes less time than the text in every frame.
-  written(text, ratio) {
-    const known = this.names.get(text);
+  written(text, ratio, colour) {
+    const key = colour + text;
+    const known = this.names.get(key);
     if (known?.ratio === ratio) return known;
     const image = document.createElement("canvas");
     const pen = image.getContext("2d");
@@ -364,14 +434,33 @@ export class Viewer {
     const style = getComputedStyle(document.documentElement);
     Object.assign(pen, {
       font, textAlign: "center", textBaseline: "middle", lineWidth: 3, lineJoin: "round",
-      strokeStyle: style.getPropertyValue("--halo"), fillStyle: style.getPropertyValue("--on-part"),
+      strokeStyle: style.getPropertyValue("--halo"), fillStyle: style.getPropertyValue(colour),
     });
     pen.strokeText(text, 0.5 * wide, 0.5 * high);
     pen.fillText(text, 0.5 * wide, 0.5 * high);
     const name = { image, wide, high, text: width, ratio };
-    this.names.set(text, name);
+    this.names.set(key, name);
     return name;
   }
+}
+
+// Steps from each pixel to the nearest of another part, up to ROOM.
+function roomAround(wide, owner) {
+  const out = new Uint8Array(owner.length);
+  const last = owner.length - 1;
+  for (const way of [1, -1])
+    for (let n = 0; n <= last; n++) {
+      const at = way > 0 ? n : last - n;
+      const column = at % wide;
+      if (owner[at] < 0 || column === 0 || column === wide - 1) continue;
+      let least = ROOM - 1;
+      for (const step of [1, wide - 1, wide, wide + 1]) {
+        const other = at - way * step;
+        least = Math.min(least, owner[other] === owner[at] ? out[other] : 0);
+      }
+      out[at] = way > 0 ? least + 1 : Math.min(out[at], least + 1);
+    }
+  return out;
 }
 
 function rgb(text) {
