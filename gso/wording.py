@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Sequence
-
-import numpy as np
 
 _log = logging.getLogger("gso")
 
@@ -39,13 +38,13 @@ def length(value: float, unit: str = "", digits: int = 3) -> str:
     >>> length(20.0, "mm"), length(0.5), length(0.0123456), length(1234.5)
     ('20.0 mm', '0.500', '0.0123', '1230')
     """
-    if value == 0 or not np.isfinite(value):
+    if value == 0 or not math.isfinite(value):
         text = f"{value:g}"
     elif not 1e-4 <= abs(value) < 1e6:
         text = f"{value:.{digits - 1}e}"
     else:
         rounded = float(f"{value:.{digits}g}")
-        text = f"{rounded:.{max(digits - 1 - int(np.floor(np.log10(abs(rounded)))), 0)}f}"
+        text = f"{rounded:.{max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)}f}"
     return f"{text} {unit}" if unit else text
 
 
