@@ -8,6 +8,7 @@ from gso import metrics as measure
 from gso.components import average, several, split
 from gso.mesh import Mesh
 from gso.typing import Array
+from gso.wording import listed
 
 
 def facts(mesh: Mesh) -> list[tuple[str, str]]:
@@ -23,14 +24,14 @@ def facts(mesh: Mesh) -> list[tuple[str, str]]:
     used = mesh.used
     points = mesh.vertices[used]
     length = mesh.edge_lengths
-    loops = [str(len(loop)) for loop in mesh.boundary_loops]
+    loops = [len(loop) for loop in mesh.boundary_loops]
     rows = [
         ("kind", _kind(mesh)),
         ("vertices", str(len(mesh.vertices))),
         ("faces", str(len(mesh.faces))),
         ("edges", str(len(mesh.edges))),
         ("components", str(np.unique(mesh.components[used]).size)),
-        ("boundary loops", f"{len(loops)}" + (f" ({', '.join(loops)} vertices)" if loops else "")),
+        ("boundary loops", f"{len(loops)}" + (f" ({listed(loops)} vertices)" if loops else "")),
         ("Euler characteristic", str(mesh.euler_characteristic)),
         ("bounding box", " x ".join(f"{side:.6g}" for side in np.ptp(points, axis=0))),
         ("from, to", " ".join(map(_point, (points.min(axis=0), points.max(axis=0))))),
