@@ -150,7 +150,8 @@ def measured(results: dict[str, Any]) -> dict[str, str]:
     build = f" {results['kernels']}" if "kernels" in results else ""
     found["measured-machine"] = "\n".join(
         wrapped(
-            f"{surfaces['name']}; mean loss_gc {surfaces['loss_gc']:.3f}. {about['processor']}, "
+            f"{surfaces['name']}, of which the first {surfaces['count']:,} with a mean loss_gc of "
+            f"{surfaces['loss_gc']:.3f}. {about['processor']}, "
             f"Python {about['python']}, one thread.{build} Printed by "
             f"``{results['command']}``."
         )

@@ -93,10 +93,8 @@ class Loss:
             parts.append("better than all of the package: " + "; ".join(map(str, self.lost)))
         rest = [w for w in self.winners if w not in self.lost]
         if rest:
-            text = "; ".join(f"{w}, {w.best_name} {w.best:.3g}" for w in rest)
-            parts.append(
-                f"better than {self.default}; another method of the package is best: {text}"
-            )
+            text = "; ".join(f"{w}; {w.best_name} has {w.best:.3g}" for w in rest)
+            parts.append(f"better than {self.default}: {text}")
         return f"{name}, {'. '.join(parts)}"
 
 
