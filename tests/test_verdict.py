@@ -366,7 +366,8 @@ def test_the_command_line_says_it_first(tmp_path, monkeypatch, unit, said):
     done = CliRunner().invoke(main, asked + unit)
     first = done.stdout.splitlines()[0]
     assert first.startswith("largest strain ")
-    assert re.search(rf"deviation 0\.0\d+{said}: not developable within 0\.01{said}$", first)
+    shown = rf"deviation 0\.0\d+{said} \([\d.]+ % of the diagonal\)"
+    assert re.search(rf"{shown}: not developable within 0\.01{said}$", first)
     assert done.exit_code == 1
     record = json.loads((tmp_path / "m.json").read_text())
     (why,) = record["reasons"]
