@@ -100,16 +100,16 @@ def _check(mesh: Mesh, name: int) -> None:
     loops = len(mesh.boundary_loops)
     if loops == 0:
         raise MeshError(
-            f"{where} is closed: it has no boundary to lay it out by; mark seams that cut it open, "
-            "have them found (gso pieces), or delete a face"
+            f"{where} is closed: it has no boundary to lay it out by; cut it open along seams that "
+            "you mark or that gso pieces finds, or delete a face"
         )
     handles = (2 - loops - mesh.euler_characteristic) // 2
     if handles > 0:
         raise MeshError(
             f"{where} has {handles} handle{'s' if handles > 1 else ''} (Euler characteristic "
             f"{mesh.euler_characteristic}, {loops} boundary loop{'s' if loops > 1 else ''}), which "
-            "do not unroll into the plane; mark seams that cut it into disks, or have them found "
-            "(gso pieces)"
+            "do not unroll into the plane; cut it open into disks, along seams that you mark or "
+            "that gso pieces finds"
         )
 
 
