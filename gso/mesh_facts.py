@@ -7,7 +7,7 @@ import numpy as np
 from gso import metrics as measure
 from gso.components import average, several, split
 from gso.mesh import Mesh
-from gso.typing import Array
+from gso.typing import Array, Json
 from gso.wording import listed
 
 
@@ -55,6 +55,16 @@ def facts(mesh: Mesh) -> list[tuple[str, str]]:
     if mesh.attributes is not None:
         rows.append(("attributes", str(mesh.attributes)))
     return rows + [("note", note) for note in mesh.notes]
+
+
+def facts_record(rows: list[tuple[str, str]]) -> Json:
+    """Return such properties by name, and their notes as a list.
+
+    >>> facts_record([("kind", "triangles"), ("note", "2 vertices are not used")])
+    {'kind': 'triangles', 'notes': ['2 vertices are not used']}
+    """
+    notes = [value for name, value in rows if name == "note"]
+    return {**{name: value for name, value in rows if name != "note"}, "notes": notes}
 
 
 def _sizes(mesh: Mesh) -> str:

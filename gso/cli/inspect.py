@@ -86,7 +86,7 @@ def info(names: tuple[str, ...], weld: float | None, as_json: bool) -> None:
     If a file cannot be read, an error is printed for it and the exit code is 1.
     """
     from gso.cli import report
-    from gso.mesh_facts import facts
+    from gso.mesh_facts import facts, facts_record
 
     failed, found = False, []
     for number, file in enumerate(names):
@@ -97,9 +97,7 @@ def info(names: tuple[str, ...], weld: float | None, as_json: bool) -> None:
             failed = True
             continue
         if as_json:
-            known = {name: value for name, value in rows if name != "note"}
-            notes = [value for name, value in rows if name == "note"]
-            found.append({"file": file, **known, "notes": notes})
+            found.append({"file": file, **facts_record(rows)})
             continue
         if number:
             click.echo()

@@ -79,6 +79,11 @@ class SVGPage:
         point = f"%.{self._digits}g %.{self._digits}g"
         form = "".join(f"M{'L'.join([point] * len(line))}{end}" for line in lines)
         drawn = form % tuple(self._placed(np.concatenate(lines)).ravel().tolist())
+        self._add_path(parent, drawn, title, kind)
+
+    @staticmethod
+    def _add_path(parent: Element, drawn: str, title: str, kind: str) -> None:
+        """Add a path with a title and a class if they are given."""
         path = SubElement(parent, "path", ({"class": kind} if kind else {}) | {"d": drawn})
         if title:
             SubElement(path, "title").text = title

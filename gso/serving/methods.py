@@ -196,11 +196,9 @@ def _fabricate(params: Json, progress: ProgressLines) -> Json:
 
 
 def _info(params: Json, progress: ProgressLines) -> Json:
-    from gso.mesh_facts import facts
+    from gso.mesh_facts import facts, facts_record
 
-    known = facts(GivenMesh.of(params).mesh())
-    notes = [value for name, value in known if name == "note"]
-    return {**{name: value for name, value in known if name != "note"}, "notes": notes}
+    return facts_record(facts(GivenMesh.of(params).mesh()))
 
 
 def _describe(params: Json, progress: ProgressLines) -> Json:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
@@ -67,11 +67,8 @@ class PageSVG(SVGPage):
             for line in lines
         ]
         drawn = "".join(self._drawn(line, "Z" if closed else "") for line in kept)
-        if not drawn:
-            return
-        path = SubElement(parent, "path", ({"class": kind} if kind else {}) | {"d": drawn})
-        if title:
-            SubElement(path, "title").text = title
+        if drawn:
+            self._add_path(parent, drawn, title, kind)
 
     def text(
         self, parent: Element, text: str, at: Array, height: float, angle: float = 0.0
