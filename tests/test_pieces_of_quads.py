@@ -18,12 +18,15 @@ def dome(side: int, wide: float = 1.0) -> Mesh:
 
 @pytest.fixture(scope="module")
 def design() -> Mesh:
-    return dome(34)
+    # Without symmetry: divisions of symmetric designs that are alike depend on the last bit.
+    x, y = np.meshgrid(np.linspace(-1, 1, 34), np.linspace(-1, 1, 34), indexing="ij")
+    height = 4.2 - (x - 0.15) ** 2 - 1.3 * (y + 0.1) ** 2 + 0.2 * x * y
+    return Mesh.from_grid(np.dstack([x, y, 0.6 * np.sqrt(height)]))
 
 
 @pytest.fixture(scope="module")
 def found(design) -> Segmentation:
-    return gso.pieces(design, max_deviation="1.75%", workers=0, effort="draft")
+    return gso.pieces(design, max_deviation="2%", workers=0, effort="draft")
 
 
 def test_seams_are_edges_of_the_design(design, found):
@@ -47,7 +50,7 @@ def test_random_points_are_within_the_distance(design, found):
     for one, two in ((found.design, design), (design, found.design)):
         face, share = rng.integers(len(one.triangles), size=3000), rng.dirichlet(np.ones(3), 3000)
         points = np.einsum("nk,nkd->nd", share, one.vertices[one.triangles[face]])
-        assert metrics.point_to_surface(points, two).max() <= 0.0175 * design.diagonal
+        assert metrics.point_to_surface(points, two).max() <= 0.02 * design.diagonal
     assert found.metrics["strain_max"] <= 1e-3
 
 

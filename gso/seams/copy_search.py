@@ -307,6 +307,8 @@ class CopySearch:
         if self.mirror is not None:
             excess = np.maximum(excess, excess[self.mirror.partners(label)])
         bad = excess > 1.0
+        if not bad.any():
+            return label
         level = np.zeros(len(label))
         for own in np.flatnonzero(bad):
             faces = np.flatnonzero(label == own)

@@ -53,7 +53,7 @@ class Effort:
 
 #: By name, the fastest first.
 EFFORTS = {
-    "draft": Effort(divisions=2, merges=0, rounds=2, budgets=4, variants=3, laid=0),
+    "draft": Effort(divisions=2, merges=3, rounds=2, budgets=4, variants=3, laid=0),
     "standard": Effort(divisions=3, merges=8, rounds=9, budgets=12, variants=6, laid=18),
     "best": Effort(divisions=4, merges=24, rounds=12, budgets=30, variants=12, laid=50),
 }
