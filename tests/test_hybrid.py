@@ -775,12 +775,49 @@ def test_the_better_of_two_starts_is_refined(surfaces):
     options = gso.DevelopableOptions()
     cold = tno.optimize(design, verdict=False)
     for points, source in ((cold.mesh.vertices, "net"), (design.vertices * [1, 1, 1.3], "cold")):
-        start = better_start(design, points, 64, options, tno.optimize)
+        start = better_start(design, points, 64, options, tno.optimize, judged=False)
         assert (start.resolution, start.solved) == (40, True)
         result = tno.optimize(design, x0=start, verdict=False)
         assert energy(result) <= 1.01 * energy(cold), source
     small = Mesh.from_grid(saddle(19))
     assert better_start(small, small.vertices, 64, options, tno.optimize) is None
+
+
+@pytest.mark.parametrize(
+    "far, judged, source",
+    [
+        ((0.01, 0.10), False, "net"),
+        ((0.01, 0.04), True, "net"),
+        ((0.01, 0.06), True, "cold"),
+        ((0.06, 0.06), True, None),
+    ],
+)
+def test_a_start_whose_minimum_is_too_far_is_not_refined(far, judged, source):
+    design = Mesh.from_grid(saddle(65))
+
+    def solve(copy, options, verdict, x0):
+        # The minimum from the net is lower; both are at some share of the size from the design.
+        deviation = far[x0 is not None] * copy.size
+        moved = copy.replaced(copy.vertices + np.array([0, 0, deviation]))
+        energy = {"curvature": 1.0 - (x0 is not None)}
+        return SimpleNamespace(design=copy, mesh=moved, energy=energy, deviation=deviation)
+
+    found = better_start(design, design.vertices, 33, gso.DevelopableOptions(), solve, judged)
+    assert (None if found.points is None else found.source) == source
+
+
+def test_a_cold_solve_follows_a_start_that_ends_barely_too_far():
+    x, y = np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21), indexing="ij")
+    parabola, wave = np.dstack([x, y, 0.3 * x * x]), 0.168 * np.sin(2 * np.pi * y) * x
+    design = Mesh.from_grid(parabola + np.multiply.outer(wave, [0, 0, 1]))
+    cold = tno.optimize(design)
+    assert cold.usable and not cold.notes
+    alone = tno.optimize(design, x0=Start(parabola, guarded=True), verdict=False)
+    assert alone.warm_start != "cold" and alone.deviation > 0.05 * design.size
+    judged = tno.optimize(design, x0=Start(parabola, guarded=True))
+    assert judged.warm_start == "cold" and judged.iterations < 2 * cold.iterations
+    np.testing.assert_array_equal(judged.grid, cold.grid)
+    assert "another solve, by 'curvature';" in judged.notes[0]
 
 
 def test_less_may_be_left_with_more_effort(surfaces, coarse_net):

@@ -49,7 +49,7 @@ def _net(name: str, task: str, model: str, note: str = "") -> Method:
 
 def _hybrid(task: str) -> Method:
     def run(case: Case, model: str) -> Solved:
-        result = gso.hybrid.solve(case.given, task=task, net=model)
+        result = gso.hybrid.solve(case.given, task=task, net=model, verdict=False)
         return replace(_solved(result), more=lambda: {"warm": float(result.warm_start == "net")})
 
     kind, note = net_tasks.get(task), "the default net, then the optimiser"

@@ -44,8 +44,9 @@ _BATCH = 64
 _PASSES = 1
 #: Whether a net is to be used for a design.
 Worth: TypeAlias = "Callable[[Mesh], bool]"
-#: Note on results that do not begin with the net's.
+#: Notes on results that do not begin with the net's.
 _LOST = "the design's own minimum on a coarse grid is lower than that from the net's result"
+_TOO_FAR = "solved without a net: on a coarse grid its minimum is too far from the design"
 #: Shares of the energy that are left to further iterations: with less than the effort of a cold
 #: solve, and with the same.
 _LEFT = (3e-3, 3e-4)
@@ -355,7 +356,9 @@ def _finished(
             if not refused:
                 start = _start(design, prediction.points, task, polish, effort, keywords)
                 result = optimize(design, task=task, x0=start, **keywords)
-                if start.source == "cold":
+                if start.points is None:
+                    result.notes += (_TOO_FAR,)
+                elif start.source == "cold":
                     result.notes += (_LOST,)
                 flat = prediction.points.shape[1] == 2 and result.warm_start == "net"
                 if flat and not keywords["constraints"]:
@@ -403,7 +406,10 @@ def _start(
     if max(design.grid_shape) >= _TWO_STARTS[careful] * SIZE:
         more = {k: v for k, v in keywords.items() if k in ("formulation", "terms")}
         solve = partial(optimize, task=task, **more)
-        lower = better_start(design, points, SIZE, options, solve)
+        judged = bool(keywords.get("verdict", True))
+        lower = better_start(design, points, SIZE, options, solve, judged)
+        if lower is not None and lower.points is None:
+            return lower
         if lower is not None:
             return replace(lower, guarded=True, remaining=_LEFT[careful])
     return start

@@ -20,6 +20,8 @@ from gso.verdict import Code
 #: Factor by which a solve may raise the curvature of the one whose result it improves, and the
 #: share of the other's strain below which it may have any curvature.
 _RISE, _GAIN = 1.5, 0.5
+#: Excess of the distance from a warm start up to which a cold solve is likely to be near enough.
+_BARELY = 1.1
 #: Reasons that a bound on the distance and more fairness may remove.
 _MENDED = {
     Code.STRAIN,
@@ -76,19 +78,18 @@ class _Solves:
     def usable(self, request: Request[Options]) -> Result:
         """Return the first usable result of a request and those near the design, or the best."""
         best = first = self._result(request)
+        near = True
         for other in self._others(request, first):
             result = self._result(other)
             if excess(result) < excess(best):
-                best = result
+                best, near = result, other.max_displacement is not None
             if best.usable or self._cancelled:
                 break
         if best is first:
             return first
         why = str(first.reasons[0]).partition(";")[0]
-        note = (
-            f"this is another solve, by {best.formulation!r}, that is kept near the design; "
-            f"of the first one {why}"
-        )
+        kept = ", that is kept near the design" if near else ""
+        note = f"this is another solve, by {best.formulation!r}{kept}; of the first one {why}"
         return replace(best, notes=(*best.notes, note))
 
     @property
@@ -114,7 +115,7 @@ class _Solves:
         """Return the judged result of a request."""
         run, own = self.run, self.run.case.solver_request
         asked = (request.formulation, request.options, request.max_displacement)
-        key = (*asked, request.weight_factor)
+        key = (*asked, request.weight_factor, request.x0 is None)
         if key not in self._found:
             result = conclude(run, run.solve() if request is own else run(request))
             if request is not own:
@@ -122,6 +123,11 @@ class _Solves:
             self._cancelled |= result.status is Status.CANCELLED
             self._found[key] = result
         return self._found[key]
+
+    def _warm(self, request: Request[Options]) -> bool:
+        """Whether a request begins with a start that a cold solve may replace."""
+        given = request.x0 is not None and request.start.guarded
+        return given and not self.run.start_refused
 
     def _others(self, request: Request[Options], first: Result) -> Iterator[Request[Options]]:
         """Return other requests, if they may remove the reasons against a result."""
@@ -131,6 +137,9 @@ class _Solves:
             return
         if Code.CROSSES_ITSELF in codes and crossings(case.design).size:
             return
+        if self._warm(request) and codes == {Code.FAR} and excess(first) <= _BARELY:
+            # A cold solve, which is often as near as that, takes less time than those by `others`.
+            yield replace(request, x0=None)
         yield from others(case.analysis, request, bool(codes - {Code.FAR}))
 
 
