@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 
 import ezdxf
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.special import ellipe
 
 import gso
 from gso import Mesh, io, recognition
+from gso.cli import main
 from gso.mesh import Labels
 from gso.workshop import Finish, Thickness
 
@@ -377,6 +380,13 @@ class TestSheetMetal:
         (part,) = done.parts
         assert len(part.bends) == 5
         assert part.area == pytest.approx(24800, rel=1e-9)
+
+    @pytest.mark.parametrize("shape", [bracket, lambda: box((0, 0, 0), (100, 60, 40))])
+    def test_unfold_says_that_a_sheet_has_two_sides(self, shape, tmp_path):
+        file, out = saved(shape(), tmp_path / "a.step"), tmp_path / "a.svg"
+        done = CliRunner().invoke(main, ["unfold", str(file), "-o", str(out), "--json"])
+        notes = " ".join(json.loads(done.stdout)["notes"])
+        assert ("gso fabricate" in notes) == (shape is bracket)
 
     @pytest.mark.parametrize(
         ("high", "join"), [((50.0, 50.0, 9.0), cut), ((50.0, 23.0, 12.0), fused)]

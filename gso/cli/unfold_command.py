@@ -87,6 +87,8 @@ def unfold(
     The shape stays as it is. The parts are as few as are found, and do not overlap. Mountain and
     valley folds are in layers of their own.
     """
+    from dataclasses import replace
+
     import numpy as np
 
     from gso import io
@@ -131,6 +133,7 @@ def unfold(
         except OptionError as error:
             net = made(None)
             click.echo(f"note: {error}; its part is on several pages", err=True)
+    net = replace(net, notes=(*net.notes, *_both_sides(name, weld)))
     options = {} if paper is None else {"paper": paper}
     parts = of_net(spelled(Path(name).stem), net)
     drawing, bare = drawn([parts], millimetres(unit), finish)
@@ -138,9 +141,33 @@ def unfold(
     if page is not None:
         write_page(net, name, page, unit, finish=finish)
     if as_json:
-        shared.tell_json(record(net, unit) | {"output": out, "notes": bare})
+        shared.tell_json(record(net, unit) | {"output": out, "notes": [*net.notes, *bare]})
     elif not quiet:
         click.echo("\n".join([*text(net, unit), *(f"note: {note}" for note in bare)]))
+
+
+def _both_sides(name: str, weld: float | None) -> list[str]:
+    """Say which solids of a CAD file are sheets, whose net has both sides."""
+    from gso import io
+    from gso.components import split
+    from gso.errors import MeshError
+    from gso.sheet_metal import sheet_solid
+
+    if io.suffix_of(name) not in io.SPLINE_SUFFIXES:
+        return []
+    try:
+        sheets = sum(
+            sheet_solid(part.mesh) is not None for part in split(file_options.load(name, weld))
+        )
+    except MeshError:
+        # A thickness that is not the same everywhere.
+        sheets = 1
+    if not sheets:
+        return []
+    return [
+        f"solids of sheet metal: {sheets}. Their nets have both sides and the narrow faces; for "
+        f"the blank to cut and bend: gso fabricate {name} -o parts"
+    ]
 
 
 def record(net: Net, unit: str) -> Json:
