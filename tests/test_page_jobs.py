@@ -1,4 +1,4 @@
-"""The pages of five jobs in a browser: they show parts, and fold them."""
+"""The pages of six jobs in a browser: they show parts, and fold them."""
 
 from __future__ import annotations
 
@@ -67,6 +67,13 @@ JOBS = {
         command("loft", str(ROOT / "examples" / "dinghy.csv"), "-o", str(at / "hull.obj")),
         command("fabricate", str(at / "hull.obj"), "-o", str(at / "job"), "--workers", "0"),
         at / "job" / "index.html",
+    ),
+    "loft": lambda at: (
+        command(
+            *("loft", str(ROOT / "examples" / "dinghy.csv"), "-o", str(at / "hull.dxf")),
+            *("--unit", "m", "--page", str(at / "hull.html")),
+        ),
+        at / "hull.html",
     ),
     "scan": lambda at: (
         gso.save(scan(), at / "scan.obj"),

@@ -9,6 +9,7 @@ import click
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.commands import Command
+from gso.cli.page_file import PAGES
 
 if TYPE_CHECKING:
     from gso.typing import Json
@@ -43,6 +44,7 @@ _ON = "0.1%"
     help="Lines to bend along, of each panel.",
 )
 @shared.max_deviation
+@shared.page
 @shared.unit
 @file_options.force
 @shared.as_json
@@ -53,6 +55,7 @@ def loft(
     mirrored: bool | None,
     rulings: int,
     max_deviation: str | float | None,
+    page: str | None,
     unit: str,
     force: bool,
     as_json: bool,
@@ -66,15 +69,19 @@ def loft(
     --max-deviation of its lines, 0.1 % of the diagonal when it is not given.
     """
     from gso import io
+    from gso.io.atomic import write_bytes
     from gso.quantities import as_length
     from gso.workshop import hull_panels, whole_hull, writers
+    from gso.workshop.result_page import hull_page
 
     drawing = not out.lower().endswith(io.suffixes())
     if drawing:
         writers.check_output(out)
     else:
         io.check_writable(out)
-    file_options.spare([name], [out], force)
+    if page is not None:
+        io.check_writable(page, PAGES)
+    file_options.spare([name], [out, page], force)
     panels = hull_panels(io.read_offsets(name), mirrored=mirrored, rulings=rulings)
     hull = whole_hull(panels)
     if drawing:
@@ -83,6 +90,8 @@ def loft(
         io.save(hull, out)
     far = _ON if max_deviation is None else max_deviation
     allowed = as_length(far, "--max-deviation", diagonal=hull.diagonal, unit=unit)
+    if page is not None:
+        write_bytes(page, hull_page(panels, allowed, unit=unit).encode())
     found = [record(panel, allowed) for panel in panels]
     if as_json:
         shared.tell_json({"unit": unit, "output": out, "panels": found})
@@ -111,15 +120,13 @@ def record(panel: HullPanel, allowed: float) -> Json:
 
     flat = panel.surface.pattern.flat
     long, wide = sorted(np.ptp(flat, axis=0).tolist(), reverse=True)
-    sound, near = panel.surface.sound, panel.off <= allowed
-    why = [] if sound else ["rulings cross"]
-    why += [] if near else ["no developable panel is on both lines"]
+    why = panel.faults(allowed)
     return {
         "panel": panel.name,
         "length": long,
         "width": wide,
         "off": panel.off,
-        "usable": sound and near,
+        "usable": not why,
         "reasons": why,
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -110,6 +111,9 @@ def pieces(
             click.echo(f"note: no picture, as Matplotlib cannot be imported: {error}", err=True)
     if found.known_pattern is not None:
         write_page(found, name, os.path.join(folder, PAGE), given["unit"])
+    else:
+        # That of other pieces.
+        Path(folder, PAGE).unlink(missing_ok=True)
     if as_json:
         shared.tell_json(record(found, given["unit"]))
     else:

@@ -25,7 +25,8 @@ def view(file: str, out: str, unit: str, force: bool, quiet: bool) -> None:
     """Show the result FILE, .npz of gso optimize or gso strips, as a page for a browser.
 
     The page turns, folds and explodes the patterns, and works without a network. gso optimize,
-    gso strips and gso unfold write it with --page, gso pieces and gso fabricate in their folders.
+    gso strips, gso unfold and gso loft write it with --page, gso pieces and gso fabricate in their
+    folders.
     """
     from gso import io
     from gso.result import Result

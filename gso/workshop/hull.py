@@ -36,6 +36,17 @@ class HullPanel:
     surface: RuledSurface
     off: float
 
+    def faults(self, allowed: float) -> list[str]:
+        """Return the reasons against the panel: lines to bend along that cross, and distance.
+
+        Parameters
+        ----------
+        allowed : float
+            Largest distance from its lines.
+        """
+        why = [] if self.surface.sound else ["rulings cross"]
+        return why + ([] if self.off <= allowed else ["no developable panel is on both lines"])
+
 
 def hull_panels(
     lines: Mapping[str, Array], *, mirrored: bool | None = None, rulings: int = 33

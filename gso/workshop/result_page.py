@@ -1,7 +1,8 @@
-"""The page of a result: its patterns as parts, without what fabrications add."""
+"""Pages of results and hulls: patterns as parts, without what fabrications add."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from gso import metrics
@@ -14,13 +15,14 @@ from gso.unfolding import Net
 from gso.verdict import ordered
 from gso.workshop.certificate import design_record
 from gso.workshop.finish import Finish
+from gso.workshop.hull import HullPanel
 from gso.workshop.names import spelled
 from gso.workshop.page import page_html
 from gso.workshop.page_data import Shown
 from gso.workshop.page_views import Views
 from gso.workshop.panels import Made
 from gso.workshop.parts import fitted, parts_from
-from gso.workshop.pattern_panels import of_net, of_pieces, of_result, surface_of
+from gso.workshop.pattern_panels import of_net, of_pieces, of_result, of_surface, surface_of
 
 
 def result_page(
@@ -62,21 +64,79 @@ def result_page(
     """
     scale = millimetres(unit)
     made, design, notes = _made(found, spelled(name))
-    fit = fitted(made, scale, finish)
-    parts, _ = parts_from(fit, finish)
     reasons = [reason.scaled(scale).record("mm") for reason in ordered(made.reasons)]
-    record = design_record(fit, parts, [made.name]) | {"reasons": reasons}
-    for entry in record["parts"]:
-        entry["same_as"] = None
+    return _page([(made, design, reasons)], notes, scale, finish)
+
+
+def hull_page(panels: Sequence[HullPanel], allowed: float, *, unit: str = "mm") -> str:
+    """Return the page of the panels of a hull as HTML.
+
+    Parameters
+    ----------
+    panels : sequence of HullPanel
+        Of :func:`gso.workshop.hull_panels`.
+    allowed : float
+        Largest distance of a panel from its lines, in the unit.
+    unit : str
+        Unit of the coordinates.
+
+    Raises
+    ------
+    OptionError
+        The unit is not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gso.workshop import hull_panels
+    >>> x, zero = np.linspace(0.0, 4.0, 9), np.zeros(9)
+    >>> keel = np.stack([x, zero, zero], axis=1)
+    >>> lines = {"keel": keel, "sheer": keel + [0.0, 1.0, 1.0]}
+    >>> page = hull_page(hull_panels(lines), 0.01, unit="m")
+    >>> page.count('class="drawing"')
+    2
+    """
+    shown = []
+    for panel in panels:
+        surface = panel.surface
+        record: Json = {"area": metrics.area(surface.mesh), "deviation_mean": 0.0}
+        record |= {"deviation_max": 0.0, "strain_max": 0.0}
+        made = of_surface(
+            spelled(panel.name), surface.mesh, surface.pattern, record, surface.folded
+        )
+        reasons: list[Json] = [
+            {"text": f"panel {panel.name}: {why}"} for why in panel.faults(allowed)
+        ]
+        shown.append((made, surface.mesh, reasons))
+    return _page(shown, (), millimetres(unit), Finish(notches=None))
+
+
+def _page(
+    shown: Sequence[tuple[Made, Mesh, list[Json]]],
+    notes: Sequence[str],
+    scale: float,
+    finish: Finish,
+) -> str:
+    """Return the page of what was made of designs, with the reasons against each."""
+    parts, records, views = [], [], []
+    for made, design, reasons in shown:
+        fit = fitted(made, scale, finish)
+        own, _ = parts_from(fit, finish)
+        record = design_record(fit, own, [made.name]) | {"reasons": reasons}
+        for entry in record["parts"]:
+            entry["same_as"] = None
+        records.append(record)
+        parts += own
+        views.append(Shown(made, design, scale, fit.panels))
+    against = [reason for record in records for reason in record["reasons"]]
     certificate: Json = {
-        "usable": not reasons,
-        "reasons": reasons,
+        "usable": not against,
+        "reasons": against,
         "notes": list(notes),
-        "designs": [record],
+        "designs": records,
         "sheets": [],
     }
-    shown = [Shown(made, design, scale, fit.panels)]
-    return page_html(certificate, parts, [], Views(shown, certificate))
+    return page_html(certificate, parts, [], Views(views, certificate))
 
 
 def _made(found: Result | Segmentation | Net, name: str) -> tuple[Made, Mesh, tuple[str, ...]]:

@@ -60,7 +60,7 @@ def check_whole(mesh: Mesh) -> None:
     if len(np.unique(mesh.components[mesh.used])) > 1:
         raise MeshError(
             f"strips take one surface, and this mesh has {mesh.components.max() + 1} components: "
-            "make those of each on its own"
+            "make those of each on its own, or take gso.fabricate, which makes the parts of all"
         )
     if not parametrization.flattens(mesh) or parametrization.opened(mesh).cut is not None:
         raise MeshError(
