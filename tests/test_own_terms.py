@@ -236,3 +236,49 @@ def test_a_cut_design_takes_none():
     pieces = gso.cut(design, gso.seams.Path([4, 76]))
     with pytest.raises(OptionError, match="cut into pieces takes no terms"):
         gso.tno.optimize(pieces, terms=[Own()])
+
+
+def rise(points, constants):
+    return (points[0][2] - constants[0],)
+
+
+FITTING = {
+    "stencil": (("surface", np.arange(4)[:, None]),),
+    "weights": np.full(4, 0.25),
+    "constants": np.zeros((1, 4)),
+}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "weight", "words"),
+    [
+        ({}, -1.0, "has the weight -1.0"),
+        ({}, np.nan, "has the weight nan"),
+        ({}, "1", "has the weight '1'"),
+        ({"weights": np.full(3, 0.25)}, 1.0, r"constants have the shape \(1, 4\).*\(c, 3\)"),
+        ({"weights": -np.ones(4)}, 1.0, "weights must be finite numbers of 0 or more"),
+        ({"constants": np.zeros(4)}, 1.0, r"constants have the shape \(4,\).*\(c, 4\)"),
+        ({"constants": np.zeros((4, 1))}, 1.0, r"constants have the shape \(4, 1\)"),
+        ({"constants": np.full((1, 4), np.nan)}, 1.0, "constants must be finite"),
+        ({"stencil": (("surface", np.arange(4)),)}, 1.0, r"the shape \(4,\)"),
+        ({"stencil": (("surface", np.full((4, 1), 81)),)}, 1.0, "row 81 of 'surface'.* 81 rows"),
+        ({"stencil": (("surface", np.zeros((4, 1))),)}, 1.0, "whole numbers"),
+        ({"stencil": (("flat", np.zeros((4, 1), int)),)}, 1.0, "no block 'flat'.* 'surface'"),
+        ({"residual": lambda points, _: points[0][2]}, 1.0, "residual .*lambda.* of a term fails"),
+        ({"residual": lambda p, _: (max(p[0][2], 0.0),)}, 1.0, "without conditions"),
+        ({"residual": lambda p, c: (c[1],)}, 1.0, "residual .*lambda.* of a term fails"),
+    ],
+)
+def test_terms_that_do_not_fit_are_named(wrong, weight, words):
+    def build(mesh):
+        term = Term("height", **{"residual": rise, **FITTING, **wrong})
+        return [Weighted(term, weight)]
+
+    with pytest.raises(OptionError, match=words):
+        gso.tno.optimize(cylinder(9) + saddle(9), terms=[build])
+
+
+def test_what_is_no_term_is_named_in_one_line():
+    with pytest.raises(OptionError, match=r"an object of Term is no gso\.energy\.Weighted") as error:
+        gso.tno.optimize(saddle(9), terms=[lambda mesh: [Term("height", rise, **FITTING)]])
+    assert len(str(error.value)) < 200

@@ -190,16 +190,16 @@ class _Search:
             found = self._found(one, fit, name)
             if 1 not in self.results or found.order < self.results[1].order:
                 self.fits[1], self.results[1], self.start = fit, found, name
-        count, most = 1, wanted.strips or wanted.most
+        fewer, count, most = 0, 1, wanted.strips or wanted.most
         while count < most and not self._enough(count):
             more = min(2 * count, most)
             fit = self.fits[count]
             self.fits[more] = halved(job, fit, _worst(job, fit, more - count))
-            count = more
+            fewer, count = count, more
             if wanted.strips is None or count == most:
                 self.results[count] = self._found(job, self.fits[count], self.start)
         if wanted.strips is None and wanted.met(self.results[count].surface):
-            self._bisect(job, count)
+            self._bisect(job, fewer, count)
 
     def _enough(self, count: int) -> bool:
         """Return whether there are enough strips, or more of them are of no use."""
@@ -225,10 +225,9 @@ class _Search:
         forecast = self._far(count) * share ** np.log2(wanted.most / count)
         return bool(forecast > wanted.max_deviation)
 
-    def _bisect(self, job: Job, count: int) -> None:
-        """Bisect between half a number of strips, which was too few, and that number."""
-        base = low = count // 2
-        high = count
+    def _bisect(self, job: Job, fewer: int, count: int) -> None:
+        """Bisect between a number of strips that was too few, and one that is enough."""
+        base, low, high = fewer, fewer, count
         while high - low > 1:
             middle = (low + high) // 2
             fit = halved(job, self.fits[base], _worst(job, self.fits[base], middle - base))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from gso.energy.base import Residual, Vectors
+from gso.errors import OptionError
 from gso.geometry.ops import TINY
 from gso.solver.printing import Graph, numpy_source
 from gso.typing import Array, S
@@ -52,10 +53,23 @@ def casadi_function(
         Number of constants.
     jacobian : bool
         Also return the dense Jacobian, row by row.
+
+    Raises
+    ------
+    OptionError
+        The residual cannot be evaluated for symbols.
     """
     ca = _casadi()
     x, c = ca.SX.sym("x", sum(shape)), ca.SX.sym("c", constants)
-    value = ca.vertcat(*residual(_points(x, shape), ca.vertsplit(c)))
+    try:
+        value = ca.vertcat(*residual(_points(x, shape), ca.vertsplit(c)))
+    except Exception as error:
+        name = getattr(residual, "__qualname__", repr(residual))
+        why = (str(error).strip() or type(error).__name__).splitlines()[-1]
+        raise OptionError(
+            f"the residual {name} of a term fails for CasADi symbols: {why}; it must return a "
+            "tuple of expressions of its points and constants, without conditions"
+        ) from error
     outputs = [value]
     if jacobian:
         outputs.append(ca.vec(ca.densify(ca.jacobian(value, x)).T))

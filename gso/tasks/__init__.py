@@ -45,7 +45,9 @@ __getattr__, __dir__ = at_first_use(
     },
 )
 
-_SUPPORT = "base constrained evaluation options per_component request stage_constraints start"
+_SUPPORT = (
+    "base constrained evaluation options own_terms per_component request stage_constraints start"
+)
 _FILES = Registry(__name__, __path__, tuple(_SUPPORT.split()))
 _ADDED: dict[str, Task] = {}
 #: Tasks of installed packages.

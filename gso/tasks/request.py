@@ -14,6 +14,7 @@ from gso.errors import OptionError
 from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain
 from gso.tasks.options import Options
+from gso.tasks.own_terms import check_own_term, kind
 from gso.tasks.start import Start
 from gso.typing import Array, MeshLike
 
@@ -122,21 +123,25 @@ class Request(Generic[O]):
         Raises
         ------
         OptionError
-            What `terms` returns is no sequence of `gso.energy.Weighted`, or a name is taken.
+            What `terms` returns is no sequence of `gso.energy.Weighted`, a term cannot be
+            evaluated, or a name is taken.
         """
         if not self.terms:
             return []
+        items = list(items)
         taken, found = {item.term.name for item in items}, []
+        rows = {block: len(mesh.vertices) for item in items for block, _ in item.term.stencil}
         for build in self.terms:
             built = build(mesh)
             if not isinstance(built, Iterable):
                 raise OptionError(
-                    f"terms: {build!r} returns {built!r}; it must return a list of "
+                    f"terms: {build!r} returns {kind(built)}; it must return a list of "
                     "gso.energy.Weighted"
                 )
             for item in built:
                 if not isinstance(item, Weighted):
-                    raise OptionError(f"terms: {item!r} is no gso.energy.Weighted")
+                    raise OptionError(f"terms: {kind(item)} is no gso.energy.Weighted")
+                check_own_term(item, rows)
                 if item.term.name in taken:
                     raise OptionError(
                         f"terms: the name {item.term.name!r} is that of a term of the formulation; "
