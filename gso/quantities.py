@@ -28,6 +28,11 @@ Length: TypeAlias = "float | str"
 #: A strain: a ratio such as 0.01, or a text such as "0.01" or "1%".
 Strain: TypeAlias = "float | str"
 
+#: Diagonals in millimetres beyond which a design is likely to have another unit: hardly anything is
+#: folded that is as small as a nail, or as large as a stadium.
+_TINY, _HUGE = 15.0, 5e5
+#: Share of the diagonal from which on a distance is large.
+_LARGE = 0.2
 _TEXT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z%]*)\s*", re.I)
 
 
@@ -124,6 +129,41 @@ def millimetres(unit: str, name: str = "unit") -> float:
     if unit not in MILLIMETRES:
         raise OptionError(f"{name}: unknown unit {unit!r}; {choices(unit, MILLIMETRES)}")
     return MILLIMETRES[unit]
+
+
+def size_notes(sides: Sequence[float], unit: str, distance: float | None = None) -> list[str]:
+    """Say what is likely to be a wrong unit: a tiny or huge design, or a distance as large as it.
+
+    Parameters
+    ----------
+    sides : sequence of float, (3,)
+        Sides of the bounding box, in the unit.
+    unit : str
+    distance : float, optional
+        Largest distance that is allowed, in the unit.
+
+    Examples
+    --------
+    >>> print(*size_notes([4.0, 3.0, 1.2], "mm"))
+    the design is 4 x 3 x 1.2 mm: name the unit of its coordinates (--unit) if that is another one
+    >>> size_notes([4.0, 3.0, 1.2], "m", 2.0)
+    ['max_deviation is 39 % of the diagonal of the design: 2 m of 5.14 m']
+    """
+    diagonal = math.hypot(*sides)
+    said = []
+    if not _TINY <= diagonal * millimetres(unit) <= _HUGE:
+        box = " x ".join(f"{side:.3g}" for side in sides)
+        said.append(
+            f"the design is {box} {unit}: name the unit of its coordinates (--unit) if that is "
+            "another one"
+        )
+    if distance is not None and distance > _LARGE * diagonal:
+        share = 100.0 * distance / diagonal if diagonal else math.inf
+        said.append(
+            f"max_deviation is {share:.3g} % of the diagonal of the design: {distance:.3g} {unit} "
+            f"of {diagonal:.3g} {unit}"
+        )
+    return said
 
 
 def as_sheet(sheet: Sequence[Length] | None, unit: str) -> tuple[float, float] | None:

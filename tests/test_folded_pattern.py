@@ -426,6 +426,25 @@ def test_rolled_bends_keep_their_radius_beside_folds(tmp_path):
     assert (zone["kind"], zone["bent_by"]) == ("cylinder", "press")
 
 
+def test_radii_of_cones_with_an_apex_are_not_negative(tmp_path):
+    # From a square to a circle: its corners are the apexes of oblique cones.
+    count = 48
+    turn = (np.arange(count) + 0.5) * 2 * np.pi / count
+    circle = np.c_[125 * np.cos(turn), 125 * np.sin(turn), np.full(count, 300.0)]
+    corners = 200.0 * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+    a = np.arange(count)
+    own = a * 4 // count
+    after = (own + 1) % 4
+    last = own != np.roll(own, -1)
+    fans = np.c_[own, 4 + (a + 1) % count, 4 + a][~last]
+    ends = np.c_[own, after, 4 + a][last], np.c_[after, 4 + (a + 1) % count, 4 + a][last]
+    duct = Mesh(np.concatenate([corners, circle]), np.concatenate([fans, *ends]))
+    finish = Finish(thickness=Thickness(1.0, radius=1.0))
+    job = gso.fabricate(duct, tmp_path, formats=("svg",), workers=0, finish=finish)
+    zones = [z for part in job.certificate["designs"][0]["parts"] for z in part["zones"]]
+    assert zones and all(zone["radius_min"] == 1.0 for zone in zones)
+
+
 def test_round_faces_are_zones_to_roll(tmp_path):
     wanted = {
         "half": (half_cylinder(), "roll R 1500, 180 deg"),

@@ -279,6 +279,7 @@ def test_terms_that_do_not_fit_are_named(wrong, weight, words):
 
 
 def test_what_is_no_term_is_named_in_one_line():
-    with pytest.raises(OptionError, match=r"an object of Term is no gso\.energy\.Weighted") as error:
+    words = r"an object of Term is no gso\.energy\.Weighted"
+    with pytest.raises(OptionError, match=words) as error:
         gso.tno.optimize(saddle(9), terms=[lambda mesh: [Term("height", rise, **FITTING)]])
     assert len(str(error.value)) < 200

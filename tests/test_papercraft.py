@@ -120,6 +120,21 @@ def test_each_part_has_a_page(tmp_path, factor):
     assert len(pypdf.PdfReader(tmp_path / "b" / "parts.pdf").pages) > len(job.parts)
 
 
+def test_faces_larger_than_a_page_are_parts_of_their_own(tmp_path):
+    # The base of the pyramid is larger, its sides are not.
+    points = [[0, 0, 0], [250, 0, 0], [250, 250, 0], [0, 250, 0], [120, 130, 60]]
+    faces = [[2, 1, 0], [3, 2, 0], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    finish = Finish(tabs=5.0, notches=None)
+    job = gso.fabricate(
+        Mesh(points, faces), tmp_path, formats=(), paper="A4", finish=finish, workers=0
+    )
+    base = max(job.parts, key=lambda part: part.area)
+    assert job.usable and 3 <= len(job.parts) <= 5 and not len(base.bends)
+    assert any(f"part {base.name} is larger than a page" in x for x in job.certificate["notes"])
+    text = [page.extract_text() for page in pypdf.PdfReader(tmp_path / "parts.pdf").pages]
+    assert all(any(part.name in page for page in text) for part in job.parts)
+
+
 @pytest.mark.parametrize("place", ["inside", "outside"])
 def test_numbers_stand_inside_or_outside(tmp_path, place):
     for tabs in (None, 5.0):

@@ -96,7 +96,8 @@ def pieces(
         raise OptionError(f"{folder} is a file; -o names a folder")
     outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json", PAGE)]
     file_options.spare([name, along, avoid], outputs, force)
-    mesh = file_options.source(name, weld)
+    mesh = file_options.load(name, weld)
+    shared.tell_size(mesh, given["unit"], given["max_deviation"], quiet)
     given |= {
         "along": file_options.lines("--along", along),
         "avoid": file_options.lines("--avoid", avoid),

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
 from gso.errors import OptionError
 from gso.quantities import MILLIMETRES, as_length, as_strain
+
+if TYPE_CHECKING:
+    from gso.mesh import Mesh
 
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
@@ -289,6 +292,20 @@ def tell(lines: Iterable[str], *, quiet: bool, aside: bool = False) -> None:
             click.echo(line, err=aside)
         elif line.startswith("not usable"):
             click.echo(line, err=True)
+
+
+def tell_size(mesh: Mesh, unit: str, max_deviation: str | float | None, quiet: bool) -> None:
+    """Say on standard error what is likely to be a wrong unit."""
+    import numpy as np
+
+    from gso.quantities import as_length, size_notes
+
+    far = None
+    if max_deviation is not None:
+        far = as_length(max_deviation, "--max-deviation", diagonal=mesh.diagonal, unit=unit)
+    for note in size_notes(np.ptp(mesh.vertices, axis=0).tolist(), unit, far):
+        if not quiet:
+            click.echo(f"note: {note}", err=True)
 
 
 def tell_json(record: object) -> None:

@@ -97,6 +97,7 @@ def unfold(
     from gso.unfolding import unfold as make
     from gso.workshop import Finish, drawn, of_net, writers
     from gso.workshop.names import spelled
+    from gso.workshop.part_notes import page_notes
     from gso.workshop.writers.pdf import SUFFIX, room
 
     writer = writers.check_output(out)
@@ -112,31 +113,27 @@ def unfold(
         edges = np.concatenate([edges, Labels("g").edges(file_options.load(name, weld))])
     factor = file_options.scale_of([mesh], scale, height, up, unit)
 
-    def made(sheet: tuple[float, float] | None) -> Net:
-        return make(
-            mesh,
-            cut=edges,
-            keep=np.array(keep, np.int64).reshape(-1, 2),
-            sheet=sheet and finish.room(sheet, 1.0),
-            unit=unit,
-            scale=factor,
-            flat_angle=flat_angle,
-            effort=effort,
-            seed=seed,
-        )
-
-    if paper is None or sheet is not None:
-        net = made(sheet)
-    else:
-        try:
-            net = made(room(paper))
-        except OptionError as error:
-            net = made(None)
-            click.echo(f"note: {error}; its part is on several pages", err=True)
+    # Faces that are larger than a page are divided in the PDF; a sheet must be large enough.
+    least = sheet or (None if paper is None else room(paper))
+    net = make(
+        mesh,
+        cut=edges,
+        keep=np.array(keep, np.int64).reshape(-1, 2),
+        sheet=least and finish.room(least, 1.0),
+        larger=sheet is None,
+        unit=unit,
+        scale=factor,
+        flat_angle=flat_angle,
+        effort=effort,
+        seed=seed,
+    )
     net = replace(net, notes=(*net.notes, *_both_sides(name, weld)))
+    shared.tell_size(net.mesh, unit, None, quiet)
     options = {} if paper is None else {"paper": paper}
     parts = of_net(spelled(Path(name).stem), net)
     drawing, bare = drawn([parts], millimetres(unit), finish)
+    if paper is not None:
+        bare += page_notes(drawing.parts, paper)
     writers.write(drawing, out, **options)
     if page is not None:
         write_page(net, name, page, unit, finish=finish)

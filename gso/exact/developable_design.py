@@ -101,6 +101,7 @@ def folded_pattern(
     cut: ArrayLike = (),
     keep: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
+    larger: bool = False,
     bend_step: Length | None = None,
     unit: str = "mm",
     press_radius: tuple[float, float] | None = None,
@@ -119,6 +120,8 @@ def folded_pattern(
         Edges that are cut in any case, and that are not.
     sheet : (float, float), optional
         Length and width that a part may have, in the mesh's unit.
+    larger : bool
+        Whether faces that are larger than the sheet are parts of their own.
     bend_step : float or str, optional
         Largest angle between neighbouring bend lines, in degrees (a number, or "15deg"), or how
         far chords between them may be from the surface, as a length ("0.5mm").
@@ -157,6 +160,7 @@ def folded_pattern(
         cut=np.concatenate([np.reshape(cut, (-1, 2)).astype(int), _apart(shape, flat)]),
         keep=keep,
         sheet=sheet,
+        larger=larger,
     )
     sliced = SlicedPattern.of(shape, joined)
     bends = ruled_bends(sliced, shape.faces, flat, press_radius, shape.tolerance)

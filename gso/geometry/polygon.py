@@ -83,10 +83,13 @@ def densified(line: Array, step: float) -> Array:
     return np.concatenate([inner, line[-1:]])
 
 
-def rectangle(flat: Array) -> tuple[float, tuple[float, float]]:
+def rectangle(
+    flat: Array, sheet: tuple[float, float] | None = None
+) -> tuple[float, tuple[float, float]]:
     """Return the smallest rectangle about points (n, 2): its angle, its length and its width.
 
-    One side of it lies on the convex hull.
+    One side of it lies on the convex hull. With a sheet, it is the smallest of those that are no
+    longer and no wider, if there are any.
 
     >>> angle, size = rectangle(np.array([[0.0, 0], [3, 3], [2, 4], [-1, 1]]))
     >>> round(float(np.degrees(angle))), [round(x, 6) for x in size]
@@ -99,7 +102,12 @@ def rectangle(flat: Array) -> tuple[float, tuple[float, float]]:
     angle = np.arctan2(side[:, 1], side[:, 0])
     turn = np.exp(-1j * angle)[:, None] * (hull @ np.array([1.0, 1j]))[None]
     wide, high = np.ptp(turn.real, axis=1), np.ptp(turn.imag, axis=1)
-    k = int((wide * high).argmin())
+    size = wide * high
+    if sheet is not None:
+        long, short = np.maximum(wide, high), np.minimum(wide, high)
+        fits = (long <= max(sheet)) & (short <= min(sheet))
+        size = np.where(fits, size, np.inf) if fits.any() else size
+    k = int(size.argmin())
     if wide[k] >= high[k]:
         return float(angle[k]), (float(wide[k]), float(high[k]))
     return float(angle[k] + 0.5 * np.pi), (float(high[k]), float(wide[k]))

@@ -183,6 +183,7 @@ class Layout:
 
 
 def within(points: Corners, sheet: tuple[float, float]) -> bool:
-    """Tell whether the smallest rectangle about points is no larger than a sheet."""
-    size = rectangle(np.stack([points.real, points.imag], axis=1))[1]
-    return size[0] <= max(sheet) * (1 + 1e-12) and size[1] <= min(sheet) * (1 + 1e-12)
+    """Tell whether a rectangle about points is no larger than a sheet."""
+    most = max(sheet) * (1 + 1e-12), min(sheet) * (1 + 1e-12)
+    long, wide = rectangle(np.stack([points.real, points.imag], axis=1), most)[1]
+    return long <= most[0] and wide <= most[1]

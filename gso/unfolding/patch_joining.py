@@ -57,6 +57,7 @@ def join_patches(
     keep: ArrayLike = (),
     cut: ArrayLike = (),
     sheet: tuple[float, float] | None = None,
+    larger: bool = False,
     flat_angle: float = 0.01,
     seed: int = 0,
     effort: float = 1.0,
@@ -79,6 +80,8 @@ def join_patches(
         Edges, by their vertices, that are not cut in any case, and that are.
     sheet : (float, float), optional
         Length and width that the smallest rectangle about a part may have.
+    larger : bool
+        Whether patches that are larger than the sheet are parts of their own.
     flat_angle : float
         Angle in degrees up to which an edge is no fold. Patches are joined along such edges first,
         and stay so.
@@ -90,7 +93,7 @@ def join_patches(
     Raises
     ------
     OptionError
-        Edges to keep cannot all be kept, or a patch is larger than the sheet.
+        Edges to keep cannot all be kept, or a patch is larger than the sheet and must not be.
     MeshError
         A triangle of a patch is inverted in its flat image.
     """
@@ -119,7 +122,7 @@ def join_patches(
             f"edge {a}-{b} cannot be kept: the faces beside it overlap when they are laid flat "
             "with all edges in keep; leave some of them out"
         )
-    if sheet is not None:
+    if sheet is not None and not larger:
         _check_sheet(corners, patch, sheet, triangles)
 
     def found(patch: Ints) -> Layout:

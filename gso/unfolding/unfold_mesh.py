@@ -41,6 +41,7 @@ def unfold(
     keep: ArrayLike | None = None,
     cut: ArrayLike | None = None,
     sheet: tuple[Length, Length] | None = None,
+    larger: bool = False,
     unit: str = "mm",
     scale: float = 1.0,
     flat_angle: float = 0.01,
@@ -68,6 +69,8 @@ def unfold(
     sheet : (float, float), optional
         Length and width of a sheet that every part must fit on, in millimetres, or texts such as
         "3m".
+    larger : bool
+        Whether faces that are larger than the sheet are parts of their own.
     unit : str
         Unit of the coordinates.
     scale : float
@@ -89,7 +92,8 @@ def unfold(
     MeshError
         The surface cannot be read, is one-sided, or has faces without area.
     OptionError
-        Edges in `keep` cannot all be kept, a face is larger than the sheet, or an option is wrong.
+        Edges in `keep` cannot all be kept, a face is larger than the sheet and must not be, or an
+        option is wrong.
 
     Examples
     --------
@@ -118,6 +122,7 @@ def unfold(
         keep=edges_between(faces.mesh, faces.vertex, keep, "keep"),
         cut=np.concatenate([edges_between(faces.mesh, faces.vertex, cut, "cut"), drawn]),
         sheet=size,
+        larger=larger,
         flat_angle=flat_angle,
         seed=int(seed),
         effort=effort,

@@ -163,14 +163,17 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     """Unfold a design that is flat or developable as it is; None if it is not."""
     thick = given.sheet
     found = None
-    for sheet in dict.fromkeys((settings.max_size or settings.page, settings.max_size)):
+    # Faces that are larger than a page are divided in the PDF; a sheet must be large enough.
+    paper = settings.max_size is None and settings.page is not None
+    for larger in (False, True)[: 1 + paper]:
         try:
             found = folded_pattern(
                 given.mesh,
                 max_strain=settings.strain,
                 cut=given.kept,
                 keep=given.uncut,
-                sheet=sheet,
+                sheet=settings.max_size or settings.page,
+                larger=larger,
                 bend_step=settings.bend_step,
                 unit=settings.unit,
                 press_radius=_press_radius(given, settings),
@@ -178,7 +181,7 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
             break
         except OptionError:
             # A face is larger than the sheet or the page.
-            if len(given.uncut) and sheet == settings.max_size:
+            if len(given.uncut) and (larger or not paper):
                 raise
     if found is None:
         return None

@@ -27,6 +27,7 @@ from gso.quantities import (
     as_sheet,
     as_strain,
     millimetres,
+    size_notes,
 )
 from gso.seams.edge_prices import Avoid, Follow
 from gso.short_repr import short_repr
@@ -38,7 +39,7 @@ from gso.workshop.certificate import design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.constrained import check_formulation
-from gso.workshop.designs import Designs, designs_of, several
+from gso.workshop.designs import Design, Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
 from gso.workshop.job_folder import CERTIFICATE, PAGE, SOLIDS, WORK, opened, path_of
@@ -49,7 +50,7 @@ from gso.workshop.output_files import Drawings, written
 from gso.workshop.page_data import Shown
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
-from gso.workshop.part_notes import guide_notes, outline_notes, seam_notes, strip_notes
+from gso.workshop.part_notes import guide_notes, outline_notes, page_notes, seam_notes, strip_notes
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.seam_strips import no_such_seam
 from gso.workshop.solids import folded_solids
@@ -353,6 +354,7 @@ def fabricate(
     shown: list[Shown] = []
     reasons: list[Reason] = []
     notes = [note for design in every for note in design.notes]
+    notes += [note for design in every for note in _size_notes(design, settings)]
     for k in chosen:
         same_as = [every[j] for j, origin in enumerate(first) if origin == k]
         copies = [design.name for design in same_as]
@@ -377,6 +379,8 @@ def fabricate(
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
         said = [*strip_notes(fit.panels, record), *outline_notes(fit.panels, record)]
         said += without_tabs(bare) if asked.tabs else []
+        if page is not None and paper is not None:
+            said += page_notes(own, paper)
         said += seam_notes(one, settings.seams(every[k].along, every[k].avoid))
         is_kept = one.record["deviation_max"] == 0.0
         if is_kept and settings.formulation == "ruled" and one.record["strain_max"] > EXACT:
@@ -459,6 +463,12 @@ def fabricate(
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)
     return Fabrication(place, tuple(parts), tuple(sheets), certificate, tuple(files), tuple(shown))
+
+
+def _size_notes(design: Design, settings: FabricationSettings) -> list[str]:
+    sides = np.ptp(design.mesh.vertices, axis=0).tolist()
+    said = size_notes(sides, settings.unit, settings.distance(design.mesh.diagonal))
+    return [f"{design.name}: {note}" for note in said]
 
 
 def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:

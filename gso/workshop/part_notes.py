@@ -8,9 +8,12 @@ import numpy as np
 
 from gso.seams.seam_request import SeamRequest, without_seams
 from gso.typing import Json
+from gso.wording import places
 from gso.workshop.certificate import chord
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made, Panel
+from gso.workshop.part import Part
+from gso.workshop.writers.pdf import on_page
 
 #: Distance of outlines from smooth curves that a note is made of, relative to the design's size.
 _COARSE = 5e-4
@@ -52,6 +55,18 @@ def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
             advice,
         )
     )
+
+
+def page_notes(parts: Sequence[Part], paper: str) -> list[str]:
+    """Return a note on parts that are larger than a page."""
+    large = [part.name for part in parts if on_page(part, paper) is None]
+    if not large:
+        return []
+    verb = "is" if len(large) == 1 else "are"
+    return [
+        f"{places('part', large)} {verb} larger than a page ({paper}), and on several pages of the "
+        "PDF; a smaller model or larger paper avoids that"
+    ]
 
 
 def outline_notes(panels: Sequence[Panel], record: Json) -> list[str]:

@@ -195,8 +195,9 @@ def thickened(panel: Panel, thickness: Thickness) -> Panel:
 
 
 def _inner_zone(zone: Zone, thickness: Thickness) -> Zone:
-    """Return a zone with inner radii."""
-    least, most = thickness.rolled.inner(zone.angle, [zone.least, zone.most]).tolist()
+    """Return a zone with inner radii, which at the apex of a cone are those of the tool."""
+    radii = thickness.rolled.inner(zone.angle, [zone.least, zone.most])
+    least, most = np.maximum(radii, thickness.radius or 0.0).tolist()
     return zone._replace(least=least, most=most)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gso.errors import OptionError
+from gso.geometry.polygon import rectangle
 from gso.quantities import as_positive
 from gso.spelling import choices
 from gso.typing import Array
@@ -132,21 +133,35 @@ def room(paper: str, margin: float = _MARGIN) -> tuple[float, float]:
     return high - 2 * margin - FOOT, wide - 2 * margin
 
 
+def on_page(part: Part, paper: str, margin: float = _MARGIN) -> Part | None:
+    """Return a part as it lies on one page, turned if need be; None if it is larger.
+
+    >>> square = Part("a", np.array([[0.0, 0], [250, 0], [250, 180], [0, 180]]))
+    >>> [round(side) for side in on_page(square, "A4").size]
+    [180, 250]
+    """
+    high, wide = room(paper, margin)
+    x, y = part.size
+    # Across, the foot of the page takes room of the width.
+    if (x <= wide and y <= high) or (x <= high + FOOT and y <= wide - FOOT):
+        return part
+    if x <= high and y <= wide:
+        return part.turned(0.5 * np.pi)
+    angle, (long, short) = rectangle(part.outline, (high, wide))
+    return part.turned(0.5 * np.pi - angle) if long <= high and short <= wide else None
+
+
 def _divided(drawing: Drawing, paper: str, margin: float) -> list[Drawing]:
     """Give each part that fits a page a drawing of its own; other parts stay together."""
     if drawing.sheet is not None:
         return [drawing]
-    high, wide = room(paper, margin)
     own, rest = [], []
     for part in drawing.parts:
-        x, y = part.size
-        # Across, the foot of the page takes room of the width.
-        if (x <= wide and y <= high) or (x <= high + FOOT and y <= wide - FOOT):
-            own.append(Drawing((part,), title=strokes.title(part)))
-        elif x <= high and y <= wide:
-            own.append(Drawing((part.turned(0.5 * np.pi),), title=strokes.title(part)))
-        else:
+        lying = on_page(part, paper, margin)
+        if lying is None:
             rest.append(part)
+        else:
+            own.append(Drawing((lying,), title=strokes.title(part)))
     return [*own, *([replace(drawing, parts=tuple(rest))] if rest else [])]
 
 
