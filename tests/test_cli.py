@@ -195,6 +195,7 @@ def test_denoises(run):
         (["-o", "no/such/out.obj"], ["no/such", "create it"]),
         (["-o", "out.doc"], [".doc", ".obj"]),
         (["-o", "out.svg", "--task", "bend"], ["--task flatten"]),
+        (["-o", "out.dxf", "--task", "flatten"], ["gso fabricate", ".svg"]),
         (["-o", "out.obj", "--plot", "out.jpg"], [".jpg", ".png"]),
         (["-o", "out.obj", "--metrics", "no/such/out.json"], ["no/such"]),
         (["-o", "out.obj", "--backend", "abacus"], ["abacus", "superlu"]),

@@ -116,6 +116,10 @@ class Job:
                 raise OptionError(
                     f"{page}: pages show flat patterns; use --task flatten or --task developable"
                 )
+        if out.lower().endswith((".dxf", ".pdf")):
+            raise OptionError(
+                f"{out}: patterns are written as .svg here; gso fabricate writes .dxf and .pdf"
+            )
         if out.lower().endswith(".svg"):
             if not has_pattern:
                 raise OptionError(
