@@ -131,7 +131,9 @@ def millimetres(unit: str, name: str = "unit") -> float:
     return MILLIMETRES[unit]
 
 
-def size_notes(sides: Sequence[float], unit: str, distance: float | None = None) -> list[str]:
+def size_notes(
+    sides: Sequence[float], unit: str, distance: float | None = None, drawn: bool = True
+) -> list[str]:
     """Say what is likely to be a wrong unit: a tiny or huge design, or a distance as large as it.
 
     Parameters
@@ -141,6 +143,8 @@ def size_notes(sides: Sequence[float], unit: str, distance: float | None = None)
     unit : str
     distance : float, optional
         Largest distance that is allowed, in the unit.
+    drawn : bool
+        Whether patterns are drawn in millimetres.
 
     Examples
     --------
@@ -151,7 +155,7 @@ def size_notes(sides: Sequence[float], unit: str, distance: float | None = None)
     """
     diagonal = math.hypot(*sides)
     said = []
-    if not _TINY <= diagonal * millimetres(unit) <= _HUGE:
+    if drawn and not _TINY <= diagonal * millimetres(unit) <= _HUGE:
         box = " x ".join(f"{side:.3g}" for side in sides)
         said.append(
             f"the design is {box} {unit}: name the unit of its coordinates (--unit) if that is "

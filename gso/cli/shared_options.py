@@ -294,8 +294,17 @@ def tell(lines: Iterable[str], *, quiet: bool, aside: bool = False) -> None:
             click.echo(line, err=True)
 
 
-def tell_size(mesh: Mesh, unit: str, max_deviation: str | float | None, quiet: bool) -> None:
-    """Say on standard error what is likely to be a wrong unit."""
+def tell_size(
+    mesh: Mesh,
+    unit: str,
+    max_deviation: str | float | None,
+    quiet: bool,
+    drawn: bool = True,
+) -> None:
+    """Say on standard error what is likely to be a wrong unit.
+
+    The size of the design only matters where its patterns are `drawn`.
+    """
     import numpy as np
 
     from gso.quantities import as_length, size_notes
@@ -303,7 +312,7 @@ def tell_size(mesh: Mesh, unit: str, max_deviation: str | float | None, quiet: b
     far = None
     if max_deviation is not None:
         far = as_length(max_deviation, "--max-deviation", diagonal=mesh.diagonal, unit=unit)
-    for note in size_notes(np.ptp(mesh.vertices, axis=0).tolist(), unit, far):
+    for note in size_notes(np.ptp(mesh.vertices, axis=0).tolist(), unit, far, drawn):
         if not quiet:
             click.echo(f"note: {note}", err=True)
 

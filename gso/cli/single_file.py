@@ -53,6 +53,8 @@ def _single(
     mesh = file_options.load(file, job.weld)
     if path.lower().endswith(".npy") and mesh.grid_shape is None:
         raise MeshError(f"{out}: the mesh is no grid, which is all that .npy holds; use .npz")
+    far = job.keywords.get("max_deviation")
+    shared.tell_size(mesh, job.unit, far, job.quiet, drawn=path.lower().endswith(".svg"))
     # For one solve of a small mesh, loading compiled loops takes longer than they save.
     small = len(mesh.vertices) <= _SMALL
     with iterations() as callback, report.status_only(), loops.without(small):

@@ -28,7 +28,6 @@ class _StripsJob(Job):
         """Make strips of one design."""
         from gso.ruled.paneling.lay_strips import strips as lay
 
-        shared.tell_size(mesh, self.unit, self.keywords["max_deviation"], self.quiet)
         return lay(mesh, unit=self.unit, **self.keywords, callback=callback)
 
 

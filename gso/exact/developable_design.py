@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.exact.fold_edges import FOLD, fold_edges, seam_angles
-from gso.exact.low_poly import facets, is_low_poly
+from gso.exact.low_poly import facets, is_low_poly, without_coarse_zones
 from gso.exact.rolled_faces import fold
 from gso.exact.ruled_bends import joined_bends, ruled_bends, zones_of
 from gso.exact.sliced_pattern import SlicedPattern, shape_size
@@ -151,6 +151,8 @@ def folded_pattern(
         if not is_low_poly(shape):
             return None
         shape = facets(shape)
+    if mesh.attributes is None or mesh.attributes.surfaces is None:
+        shape = without_coarse_zones(shape)
     flat = shape.flat()
     joined = join_patches(
         shape.vertices,

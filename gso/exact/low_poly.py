@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from gso.unfolding.dual_edges import dual_edges
 #: Number of triangles up to which a design may be a polyhedron. The angle, in radians, from which
 #: on an edge is sharp, and the share of the folds' length that is, where it is not developable.
 _FEW, _SHARP, _SHARE = 1_000, np.radians(20.0), 0.25
+#: Number of folds in a torsal face up to which they are folds.
+_COARSE = 6
 
 
 def is_low_poly(shape: Recognised) -> bool:
@@ -31,6 +34,26 @@ def is_low_poly(shape: Recognised) -> bool:
 
 def facets(shape: Recognised) -> Recognised:
     """Return the design with each triangle as a face of its own."""
-    flat = replace(shape, faces=(ShapeFace("free", np.arange(len(shape.triangles))),)).flat()
-    faces = (ShapeFace("plane", np.array([k]), flat[k, None]) for k in range(len(flat)))
+    return replace(shape, faces=tuple(_planes(shape, range(len(shape.triangles)))))
+
+
+def without_coarse_zones(shape: Recognised) -> Recognised:
+    """Return the design with the triangles of coarse torsal faces as faces of their own.
+
+    A few folds in a row are meant as folds: nobody rolls a sheet over them. Cylinders and cones
+    stay, whose equations say how they are rolled.
+    """
+    edges = dual_edges(shape.triangles, shape.vertices)
+    a, b = shape.face[edges.triangles].T
+    inside = (a == b) & (np.abs(edges.angles) > FOLD)
+    folds = np.bincount(a[inside], minlength=len(shape.faces))
+    faces: list[ShapeFace] = []
+    for face, count in zip(shape.faces, folds.tolist(), strict=True):
+        coarse = face.kind == "torsal" and count <= _COARSE
+        faces += _planes(shape, face.triangles.tolist()) if coarse else [face]
     return replace(shape, faces=tuple(faces))
+
+
+def _planes(shape: Recognised, triangles: Iterable[int]) -> list[ShapeFace]:
+    flat = replace(shape, faces=(ShapeFace("free", np.arange(len(shape.triangles))),)).flat()
+    return [ShapeFace("plane", np.array([k]), flat[k, None]) for k in triangles]

@@ -30,9 +30,9 @@ def check_own_term(item: Weighted, rows: Mapping[str, int]) -> None:
     Examples
     --------
     >>> rise = Term("rise", lambda points, _: (points[0][2],), (("surface", [[7]]),), [1.0])
-    >>> check_own_term(Weighted(rise, 0.1), {"surface": 4})
+    >>> check_own_term(Weighted(rise, 0.1), {"surface": 4})  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    gso.errors.OptionError: terms: 'rise' names row 7 of 'surface', which has 4 rows
+    gso.errors.OptionError: terms: 'rise' names row 7 of 'surface', which has 4 rows; choose ...
     """
     term, weight = item.term, item.weight
     if not isinstance(term, Term):
@@ -72,7 +72,8 @@ def _check_rows(said: str, block: str, index: Any, count: int, rows: Mapping[str
     wrong = index[(index < 0) | (index >= rows[block])]
     if wrong.size:
         raise OptionError(
-            f"{said} names row {int(wrong[0])} of {block!r}, which has {rows[block]} rows"
+            f"{said} names row {int(wrong[0])} of {block!r}, which has {rows[block]} rows; choose "
+            "rows by the mesh that is given, which may be a coarser copy of the design"
         )
 
 

@@ -61,8 +61,8 @@ def congruent(one: Mesh, two: Mesh) -> bool:
 def united(parts: Sequence[Part]) -> tuple[list[Part], dict[str, str]]:
     """Unite parts that are the same, and add up how many are needed.
 
-    They have the same outline, holes, bends, guide lines, marks and notches; their names do not
-    matter.
+    They have the same outline, holes, bends, guide lines, marks, notches and numbers of seams;
+    their names do not matter.
 
     Returns
     -------
@@ -77,7 +77,8 @@ def united(parts: Sequence[Part]) -> tuple[list[Part], dict[str, str]]:
     for part in parts:
         own = (part.holes, part.bends, part.guides, part.creases, part.marks)
         lines = tuple(len(x) for x in own)
-        texts = tuple(sorted(notch.text for notch in part.notches))
+        numbers = (x.text for x in part.labels if x.text.isdigit() and x.text != part.name)
+        texts = (*sorted(notch.text for notch in part.notches), *sorted(numbers))
         others = alike.setdefault((lines, texts, part.grain is None), [])
         for k in others:
             if _same(kept[k], part):

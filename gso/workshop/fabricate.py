@@ -50,7 +50,14 @@ from gso.workshop.output_files import Drawings, written
 from gso.workshop.page_data import Shown
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
-from gso.workshop.part_notes import guide_notes, outline_notes, page_notes, seam_notes, strip_notes
+from gso.workshop.part_notes import (
+    guide_notes,
+    outline_notes,
+    page_notes,
+    pleat_notes,
+    seam_notes,
+    strip_notes,
+)
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.seam_strips import no_such_seam
 from gso.workshop.solids import folded_solids
@@ -377,7 +384,8 @@ def fabricate(
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
-        said = [*strip_notes(fit.panels, record), *outline_notes(fit.panels, record)]
+        said = [*strip_notes(fit.panels, record), *pleat_notes(fit.panels)]
+        said += outline_notes(fit.panels, record)
         said += without_tabs(bare) if asked.tabs else []
         if page is not None and paper is not None:
             said += page_notes(own, paper)

@@ -67,11 +67,17 @@ class StepPicture:
 
 
 def in_words(step: Step, made: Made) -> str:
-    """Say which panel a step joins, and along which seams."""
+    """Say which panel a step joins, to which others, and along which seams."""
     said = made.panels[step.panel].name
     if step.closed:
         said += f", closed along {_seams(step.closed)}"
-    return said + (f", joined along {_seams(step.seams)}" if step.seams else "")
+    of_other: dict[str, list[int]] = {}
+    for seam in made.matings:
+        if seam.number in step.seams:
+            name = made.panels[seam.other(step.panel)].name
+            of_other.setdefault(name, []).append(seam.number)
+    joined = (f"to {name} along {_seams(numbers)}" for name, numbers in of_other.items())
+    return said + (", joined " + ", ".join(joined) if of_other else "")
 
 
 def order_of_joining(made: Made) -> list[Step]:

@@ -115,7 +115,7 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
                 }
             )
             if entry["same_as"] is None:
-                entries[part] = entry
+                entries[part] = {k: x for k, x in entry.items() if k != "joined"}
         out["seams"] += [_seam(one, seam, k, first, arrays) for seam in one.made.matings]
         out["steps"] += [
             {"panel": first + step.panel, "design": k, "seams": [*step.closed, *step.seams]}
@@ -138,12 +138,11 @@ def mates(made: Made, panel: int) -> list[tuple[Mating, int]]:
 
     Both sides of a seam may be of the same panel.
     """
-    out = []
-    for seam in made.matings:
-        one, two = seam.one.panel, seam.two.panel
-        if panel in (one, two):
-            out.append((seam, two if panel == one else one))
-    return out
+    return [
+        (seam, seam.other(panel))
+        for seam in made.matings
+        if panel in (seam.one.panel, seam.two.panel)
+    ]
 
 
 def _design(one: Shown, arrays: Arrays) -> Json:

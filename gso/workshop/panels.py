@@ -154,6 +154,10 @@ class Mating:
         """Length of the seam in space."""
         return float(self.along[-1])
 
+    def other(self, panel: int) -> int:
+        """Return the panel on the other side, which may be the same."""
+        return self.two.panel if self.one.panel == panel else self.one.panel
+
     def mismatch(self, panels: tuple[Panel, ...]) -> float:
         """Return how much the lengths of both sides in the patterns differ at most."""
         one, two = (arc_lengths(s.on(panels[s.panel].flat)) for s in (self.one, self.two))

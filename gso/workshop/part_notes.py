@@ -15,6 +15,9 @@ from gso.workshop.panels import Made, Panel
 from gso.workshop.part import Part
 from gso.workshop.writers.pdf import on_page
 
+#: Angle in degrees from which on a bend counts for pleats, and number of changes between up and
+#: down in one part that make a note.
+_PLEATED, _TURNS = 2.0, 4
 #: Distance of outlines from smooth curves that a note is made of, relative to the design's size.
 _COARSE = 5e-4
 
@@ -66,6 +69,29 @@ def page_notes(parts: Sequence[Part], paper: str) -> list[str]:
     return [
         f"{places('part', large)} {verb} larger than a page ({paper}), and on several pages of the "
         "PDF; a smaller model or larger paper avoids that"
+    ]
+
+
+def pleat_notes(panels: Sequence[Panel]) -> list[str]:
+    """Return a note on parts whose bends go up and down in turn.
+
+    Such a part is close to the design and developable, but pleated where the design is smooth.
+    Panels that are developable as they are do not count.
+    """
+    names, most = [], 0.0
+    for panel in panels:
+        angles = np.degrees([bend.angle for bend in panel.lines])
+        sharp = np.where(np.abs(angles) > _PLEATED, angles, 0.0)
+        turns = sharp[1:] * sharp[:-1] < 0.0
+        if not panel.is_kept and turns.sum() >= _TURNS:
+            names.append(panel.name)
+            most = max(most, float(np.abs(sharp).max()))
+    if not names:
+        return []
+    return [
+        f"{places('part', names)}: neighbouring bends go up and down in turn, by up to {most:.0f} "
+        "degrees: the part is pleated; look at it before it is cut. A smaller max_deviation makes "
+        "other parts"
     ]
 
 
