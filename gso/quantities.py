@@ -151,7 +151,7 @@ def size_notes(
     >>> print(*size_notes([4.0, 3.0, 1.2], "mm"))
     the design is 4 x 3 x 1.2 mm: name the unit of its coordinates (--unit) if that is another one
     >>> size_notes([4.0, 3.0, 1.2], "m", 2.0)
-    ['max_deviation is 39 % of the diagonal of the design: 2 m of 5.14 m']
+    ['max_deviation is 38.9 % of the diagonal of the design: 2 m of 5.14 m']
     """
     diagonal = math.hypot(*sides)
     said = []

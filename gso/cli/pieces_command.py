@@ -96,14 +96,14 @@ def pieces(
         raise OptionError(f"{folder} is a file; -o names a folder")
     outputs = [os.path.join(folder, end) for end in ("pieces.obj", "pieces.json", PAGE)]
     file_options.spare([name, along, avoid], outputs, force)
-    mesh = file_options.load(name, weld)
-    shared.tell_size(mesh, given["unit"], given["max_deviation"], quiet)
+    mesh = file_options.source(name, weld)
     given |= {
         "along": file_options.lines("--along", along),
         "avoid": file_options.lines("--avoid", avoid),
     }
     with words() as say:
         found = search(mesh, keep=Groups() if keep_groups else None, callback=say, **given)
+    shared.tell_size(found.design, given["unit"], given["max_deviation"], quiet)
     save(found, folder, given["unit"])
     if plot.available():
         try:
