@@ -524,18 +524,3 @@ def test_parts_that_touch_in_a_point_get_vertices_of_their_own():
     vertex, table = copies(pair, np.array([0, 1]))
     np.testing.assert_array_equal(vertex, [0, 1, 2, 0, 2, 3])
     np.testing.assert_array_equal(table, [[0, 1, 2, -1], [3, 4, 5, -1]])
-
-
-def test_fewer_strips_are_tried_than_a_number_that_is_no_power_of_two():
-    x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13), indexing="ij")
-    design = Mesh.from_grid(np.dstack([x, y, 0.5 - 0.4 * (x * x + y * y)]))
-
-    def solved(**wanted):
-        far = wanted.pop("max_deviation", None)
-        options = gso.RuledOptions(rulings=9, iterations=8, lines=False, **wanted)
-        return gso.tno.optimize(design, options=options, max_deviation=far).ruled
-
-    far = [solved(strips=count).farthest for count in (4, 6)]
-    found = solved(max_strips=6, max_deviation=sum(far) / 2)
-    assert far[1] < far[0] and found.strips in (5, 6)
-    assert found.farthest <= sum(far) / 2
