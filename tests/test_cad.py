@@ -51,8 +51,9 @@ BARE = {"notches": None, "labels": None}
 
 def saved(shape, path, unit="MM"):
     """Write a shape to a STEP file."""
-    Interface_Static.SetCVal_s("write.step.unit", unit)
+    # The first writer of a process defines the setting.
     writer = STEPControl_Writer()
+    Interface_Static.SetCVal_s("write.step.unit", unit)
     writer.Transfer(shape, STEPControl_StepModelType.STEPControl_AsIs)
     writer.Write(str(path))
     Interface_Static.SetCVal_s("write.step.unit", "MM")
