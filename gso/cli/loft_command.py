@@ -9,7 +9,6 @@ import click
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.commands import Command
-from gso.cli.page_file import PAGES
 
 if TYPE_CHECKING:
     from gso.typing import Json
@@ -79,8 +78,6 @@ def loft(
         writers.check_output(out)
     else:
         io.check_writable(out)
-    if page is not None:
-        io.check_writable(page, PAGES)
     file_options.spare([name], [out, page], force)
     panels = hull_panels(io.read_offsets(name), mirrored=mirrored, rulings=rulings)
     hull = whole_hull(panels)

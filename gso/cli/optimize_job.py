@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from gso import tasks
 from gso.cli import shared_options as shared
 from gso.cli.file_options import here, source, spare
-from gso.cli.page_file import PAGES
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
@@ -110,12 +109,10 @@ class Job:
         from gso import io
 
         has_pattern = self.task == "developable" or tasks.get(self.task).flat
-        if page is not None:
-            io.check_writable(page, PAGES)
-            if not has_pattern:
-                raise OptionError(
-                    f"{page}: pages show flat patterns; use --task flatten or --task developable"
-                )
+        if page is not None and not has_pattern:
+            raise OptionError(
+                f"{page}: pages show flat patterns; use --task flatten or --task developable"
+            )
         if out.lower().endswith((".dxf", ".pdf")):
             raise OptionError(
                 f"{out}: patterns are written as .svg here; gso fabricate writes .dxf and .pdf"

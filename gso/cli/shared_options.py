@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from gso.cli.page_file import PAGES
 from gso.errors import OptionError
-from gso.quantities import MILLIMETRES, as_length, as_strain
+from gso.quantities import MILLIMETRES, as_length, as_strain, size_notes
 
 if TYPE_CHECKING:
     from gso.mesh import Mesh
@@ -244,21 +245,23 @@ plot = click.option(
     help="Picture to draw (.png, .pdf, .svg).",
 )
 
-page = click.option(
-    "--page",
-    metavar="HTML",
-    type=click.Path(),
-    help="Page to look at in a browser (.html): it turns, and folds from the flat patterns.",
-)
-
 
 def _writable(ctx: click.Context, option: click.Parameter, value: str | None) -> str | None:
     """Refuse a file that cannot be written, before anything is computed."""
     if value is not None:
         from gso.io import check_writable
 
-        check_writable(value)
+        check_writable(value, PAGES if option.name == "page" else None)
     return value
+
+
+page = click.option(
+    "--page",
+    metavar="HTML",
+    type=click.Path(),
+    callback=_writable,
+    help="Page to look at in a browser (.html): it turns, and folds from the flat patterns.",
+)
 
 
 table = click.option(
@@ -305,16 +308,14 @@ def tell_size(
 
     The size of the design only matters where its patterns are `drawn`.
     """
-    import numpy as np
-
-    from gso.quantities import as_length, size_notes
-
+    if quiet:
+        return
     far = None
     if max_deviation is not None:
         far = as_length(max_deviation, "--max-deviation", diagonal=mesh.diagonal, unit=unit)
-    for note in size_notes(np.ptp(mesh.vertices, axis=0).tolist(), unit, far, drawn):
-        if not quiet:
-            click.echo(f"note: {note}", err=True)
+    sides = (mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).tolist()
+    for note in size_notes(sides, unit, far, drawn):
+        click.echo(f"note: {note}", err=True)
 
 
 def tell_json(record: object) -> None:

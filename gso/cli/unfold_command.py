@@ -10,10 +10,11 @@ import click
 from gso.cli import file_options
 from gso.cli import shared_options as shared
 from gso.cli.commands import Command
-from gso.cli.page_file import PAGES, write_page
+from gso.cli.page_file import write_page
 from gso.errors import OptionError
 
 if TYPE_CHECKING:
+    from gso.mesh import Mesh
     from gso.typing import Ints, Json
     from gso.unfolding import Net
 
@@ -101,16 +102,18 @@ def unfold(
     from gso.workshop.writers.pdf import SUFFIX, room
 
     writer = writers.check_output(out)
-    if page is not None:
-        io.check_writable(page, PAGES)
     if paper is not None and writer.SUFFIX != SUFFIX:
         raise OptionError(f"--paper {paper} needs an output whose name ends in {SUFFIX}")
     file_options.spare([name], [out, page], force)
     finish = Finish(notches=None, tabs=tabs, numbers=numbers)
     edges = np.array(cut, np.int64).reshape(-1, 2)
-    mesh = file_options.source(name, weld)
+    # CAD files are meshed once.
+    is_cad = io.suffix_of(name) in io.SPLINE_SUFFIXES
+    solids = file_options.load(name, weld) if is_cad else None
+    mesh = solids or file_options.source(name, weld)
     if keep_groups:
-        edges = np.concatenate([edges, Labels("g").edges(file_options.load(name, weld))])
+        groups = solids or file_options.load(name, weld)
+        edges = np.concatenate([edges, Labels("g").edges(groups)])
     factor = file_options.scale_of([mesh], scale, height, up, unit)
 
     # Faces that are larger than a page are divided in the PDF; a sheet must be large enough.
@@ -127,7 +130,8 @@ def unfold(
         effort=effort,
         seed=seed,
     )
-    net = replace(net, notes=(*net.notes, *_both_sides(name, weld)))
+    if solids is not None:
+        net = replace(net, notes=(*net.notes, *_both_sides(solids, name)))
     shared.tell_size(net.mesh, unit, None, quiet)
     options = {} if paper is None else {"paper": paper}
     parts = of_net(spelled(Path(name).stem), net)
@@ -143,19 +147,14 @@ def unfold(
         click.echo("\n".join([*text(net, unit), *(f"note: {note}" for note in bare)]))
 
 
-def _both_sides(name: str, weld: float | None) -> list[str]:
-    """Say which solids of a CAD file are sheets, whose net has both sides."""
-    from gso import io
+def _both_sides(solids: Mesh, name: str) -> list[str]:
+    """Say how many solids of a CAD file are sheets, whose net has both sides."""
     from gso.components import split
     from gso.errors import MeshError
     from gso.sheet_metal import sheet_solid
 
-    if io.suffix_of(name) not in io.SPLINE_SUFFIXES:
-        return []
     try:
-        sheets = sum(
-            sheet_solid(part.mesh) is not None for part in split(file_options.load(name, weld))
-        )
+        sheets = sum(sheet_solid(part.mesh) is not None for part in split(solids))
     except MeshError:
         # A thickness that is not the same everywhere.
         sheets = 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +33,7 @@ def is_low_poly(shape: Recognised) -> bool:
 
 def facets(shape: Recognised) -> Recognised:
     """Return the design with each triangle as a face of its own."""
-    return replace(shape, faces=tuple(_planes(shape, range(len(shape.triangles)))))
+    return replace(shape, faces=tuple(_planes(shape)))
 
 
 def without_coarse_zones(shape: Recognised) -> Recognised:
@@ -43,17 +42,22 @@ def without_coarse_zones(shape: Recognised) -> Recognised:
     A few folds in a row are meant as folds: nobody rolls a sheet over them. Cylinders and cones
     stay, whose equations say how they are rolled.
     """
+    torsal = np.array([face.kind == "torsal" for face in shape.faces])
+    if not torsal.any():
+        return shape
     edges = dual_edges(shape.triangles, shape.vertices)
     a, b = shape.face[edges.triangles].T
     inside = (a == b) & (np.abs(edges.angles) > FOLD)
-    folds = np.bincount(a[inside], minlength=len(shape.faces))
-    faces: list[ShapeFace] = []
-    for face, count in zip(shape.faces, folds.tolist(), strict=True):
-        coarse = face.kind == "torsal" and count <= _COARSE
-        faces += _planes(shape, face.triangles.tolist()) if coarse else [face]
+    coarse = torsal & (np.bincount(a[inside], minlength=len(torsal)) <= _COARSE)
+    if not coarse.any():
+        return shape
+    planes, faces = _planes(shape), []
+    for face, divided in zip(shape.faces, coarse.tolist(), strict=True):
+        faces += [planes[k] for k in face.triangles.tolist()] if divided else [face]
     return replace(shape, faces=tuple(faces))
 
 
-def _planes(shape: Recognised, triangles: Iterable[int]) -> list[ShapeFace]:
+def _planes(shape: Recognised) -> list[ShapeFace]:
+    """Return each triangle as a face."""
     flat = replace(shape, faces=(ShapeFace("free", np.arange(len(shape.triangles))),)).flat()
-    return [ShapeFace("plane", np.array([k]), flat[k, None]) for k in triangles]
+    return [ShapeFace("plane", np.array([k]), flat[k, None]) for k in range(len(flat))]

@@ -408,10 +408,9 @@ def _start(
         solve = partial(optimize, task=task, **more)
         judged = bool(keywords.get("verdict", True))
         lower = better_start(design, points, SIZE, options, solve, judged)
-        if lower is not None and lower.points is None:
-            return lower
         if lower is not None:
-            return replace(lower, guarded=True, remaining=_LEFT[careful])
+            again = replace(lower, guarded=True, remaining=_LEFT[careful])
+            return lower if lower.points is None else again
     return start
 
 

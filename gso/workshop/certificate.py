@@ -12,7 +12,7 @@ import numpy as np
 from gso.io.json_file import plain
 from gso.mesh import Mesh
 from gso.typing import Array, Json
-from gso.workshop.panels import Made, Panel
+from gso.workshop.panels import Panel
 from gso.workshop.part import Part
 from gso.workshop.parts import Fitted
 from gso.workshop.traced_guides import is_curved
@@ -87,7 +87,8 @@ def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) 
         "seam_mismatch_max": mismatch[worst] if mismatch else 0.0,
         "seam_mismatch_at": made.matings[worst].number if mismatch else None,
         "parts": [
-            part_record(panel, part) | {"joined": _joined(made, k)}
+            part_record(panel, part)
+            | {"joined": [{"seam": s.number, "to": made.panels[o].name} for s, o in made.mates(k)]}
             for k, (panel, part) in enumerate(zip(panels, parts, strict=True))
         ],
     }
@@ -95,15 +96,6 @@ def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) 
         own["parts_per_m2"] = len(parts) / (own["area"] / _SQUARE_METRE)
     record: Json = plain(own)
     return record
-
-
-def _joined(made: Made, panel: int) -> list[Json]:
-    """Return the seams of a panel, by number, and the parts that they join it to."""
-    return [
-        {"seam": seam.number, "to": made.panels[seam.other(panel)].name}
-        for seam in made.matings
-        if panel in (seam.one.panel, seam.two.panel)
-    ]
 
 
 def part_record(panel: Panel, part: Part) -> Json:

@@ -162,27 +162,24 @@ def _without_poles(given: Design) -> Design:
 def _exact(given: Design, settings: FabricationSettings) -> Made | None:
     """Unfold a design that is flat or developable as it is; None if it is not."""
     thick = given.sheet
-    found = None
-    # Faces that are larger than a page are divided in the PDF; a sheet must be large enough.
-    paper = settings.max_size is None and settings.page is not None
-    for larger in (False, True)[: 1 + paper]:
-        try:
-            found = folded_pattern(
-                given.mesh,
-                max_strain=settings.strain,
-                cut=given.kept,
-                keep=given.uncut,
-                sheet=settings.max_size or settings.page,
-                larger=larger,
-                bend_step=settings.bend_step,
-                unit=settings.unit,
-                press_radius=_press_radius(given, settings),
-            )
-            break
-        except OptionError:
-            # A face is larger than the sheet or the page.
-            if len(given.uncut) and (larger or not paper):
-                raise
+    try:
+        found = folded_pattern(
+            given.mesh,
+            max_strain=settings.strain,
+            cut=given.kept,
+            keep=given.uncut,
+            sheet=settings.max_size or settings.page,
+            # Those than a page are divided in the PDF; a sheet must be large enough.
+            larger=settings.max_size is None,
+            bend_step=settings.bend_step,
+            unit=settings.unit,
+            press_radius=_press_radius(given, settings),
+        )
+    except OptionError:
+        # A face is larger than the sheet.
+        if len(given.uncut):
+            raise
+        return None
     if found is None:
         return None
     record = measurements.of_pattern(

@@ -72,10 +72,9 @@ def in_words(step: Step, made: Made) -> str:
     if step.closed:
         said += f", closed along {_seams(step.closed)}"
     of_other: dict[str, list[int]] = {}
-    for seam in made.matings:
+    for seam, other in made.mates(step.panel):
         if seam.number in step.seams:
-            name = made.panels[seam.other(step.panel)].name
-            of_other.setdefault(name, []).append(seam.number)
+            of_other.setdefault(made.panels[other].name, []).append(seam.number)
     joined = (f"to {name} along {_seams(numbers)}" for name, numbers in of_other.items())
     return said + (", joined " + ", ".join(joined) if of_other else "")
 

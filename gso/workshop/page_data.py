@@ -133,18 +133,6 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
     return data | {"arrays": arrays.text()}
 
 
-def mates(made: Made, panel: int) -> list[tuple[Mating, int]]:
-    """Return the seams of a panel, each with the panel on its other side.
-
-    Both sides of a seam may be of the same panel.
-    """
-    return [
-        (seam, seam.other(panel))
-        for seam in made.matings
-        if panel in (seam.one.panel, seam.two.panel)
-    ]
-
-
 def _design(one: Shown, arrays: Arrays) -> Json:
     mesh = one.design
     motions = [closest_motion(mesh.vertices, copy.vertices) for copy in one.copies]

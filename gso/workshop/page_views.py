@@ -12,7 +12,7 @@ from gso.mesh.view import pale_colours
 from gso.typing import Array, Json
 from gso.workshop.assembly_view import Picture, Places, here
 from gso.workshop.joining import StepPicture, in_words, step_pictures
-from gso.workshop.page_data import Shown, mates
+from gso.workshop.page_data import Shown
 from gso.workshop.page_text import drawn_as
 
 #: Number of designs that are pictured.
@@ -60,7 +60,7 @@ class Views:
         others: list[str] = []
         for design, panel in self._at[part]:
             made = self.shown[design].made
-            for seam, other in mates(made, panel):
+            for seam, other in made.mates(panel):
                 seams.add(seam.number)
                 if other != panel:
                     others.append(made.panels[other].name)

@@ -195,6 +195,17 @@ class Made:
         )
         return replace(self, panels=panels, reasons=tuple(reasons))
 
+    def mates(self, panel: int) -> list[tuple[Mating, int]]:
+        """Return the seams of a panel, each with the panel on its other side.
+
+        Both sides of a seam may be of the same panel.
+        """
+        return [
+            (seam, seam.other(panel))
+            for seam in self.matings
+            if panel in (seam.one.panel, seam.two.panel)
+        ]
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return panels and seams as arrays by name."""
         said = json.dumps(
