@@ -366,12 +366,14 @@ def test_polish_is_bounded(surfaces, coarse_net, most, net):
 
 
 def test_polish_goes_on_where_the_net_ended(surfaces, coarse_net):
-    alone = hybrid.solve(surfaces[0], polish=False)
-    some = hybrid.solve(surfaces[0], polish=3)
-    whole = hybrid.solve(surfaces[0])
+    # A solve near the design, which may follow, has another energy.
+    alone = hybrid.solve(surfaces[0], polish=False, verdict=False)
+    some = hybrid.solve(surfaces[0], polish=3, verdict=False)
+    whole = hybrid.solve(surfaces[0], verdict=False)
+    cold = tno.optimize(surfaces[0], verdict=False)
     assert energy(alone) > energy(some) > energy(whole)
-    assert energy(whole) < 1.1 * energy(tno.optimize(surfaces[0]))
-    assert whole.iterations < tno.optimize(surfaces[0]).iterations
+    assert energy(whole) < 1.1 * energy(cold)
+    assert whole.iterations < cold.iterations
     assert (alone.seconds["net"], alone.iterations) == (0.01, 0)
 
 
@@ -806,7 +808,7 @@ def test_a_start_whose_minimum_is_too_far_is_not_refined(far, judged, source):
     assert (None if found.points is None else found.source) == source
 
 
-def test_a_cold_solve_follows_a_start_that_ends_barely_too_far():
+def test_a_solve_near_the_design_follows_a_start_that_ends_too_far():
     x, y = np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21), indexing="ij")
     parabola, wave = np.dstack([x, y, 0.3 * x * x]), 0.168 * np.sin(2 * np.pi * y) * x
     design = Mesh.from_grid(parabola + np.multiply.outer(wave, [0, 0, 1]))
@@ -815,9 +817,9 @@ def test_a_cold_solve_follows_a_start_that_ends_barely_too_far():
     alone = tno.optimize(design, x0=Start(parabola, guarded=True), verdict=False)
     assert alone.warm_start != "cold" and alone.deviation > 0.05 * design.size
     judged = tno.optimize(design, x0=Start(parabola, guarded=True))
-    assert judged.warm_start == "cold" and judged.iterations < 2 * cold.iterations
-    np.testing.assert_array_equal(judged.grid, cold.grid)
-    assert "another solve, by 'curvature';" in judged.notes[0]
+    assert judged.usable and judged.warm_start == "cold"
+    assert judged.iterations < 2 * cold.iterations
+    assert "another solve, by 'curvature', that is kept near the design" in judged.notes[0]
 
 
 def test_less_may_be_left_with_more_effort(surfaces, coarse_net):

@@ -104,8 +104,9 @@ def test_the_file_is_described(files):
 def test_fewer_passes(files, tmp_path):
     net, path = files["coarse"]
     (once,) = export(net, tmp_path / "once.onnx", passes=1)
-    ours, theirs = (predict(saddle(64), model=m, passes=1) for m in (net, once))
-    assert np.abs(ours - theirs).max() < CLOSE
+    more = {"passes": 1, "guarded": False}
+    ours, theirs = (predict(saddle(64), model=m, **more) for m in (net, once))
+    assert np.abs(ours - theirs).max() < CLOSE < np.abs(ours - saddle(64)).max()
     with pytest.raises(OptionError, match=r"exported with 2 passes, not 1"):
         predict(saddle(64), model=path, passes=1)
     with pytest.raises(OptionError, match="from 1 to 2"):
@@ -114,9 +115,11 @@ def test_fewer_passes(files, tmp_path):
 
 def test_several_nets_one_after_the_other(files):
     net, path = files["coarse"]
-    twice = predict(predict(saddle(64), model=net), model=net)
+    # Random weights add curvature, so that a guarded prediction would be the input.
+    more = {"guarded": False}
+    twice = predict(predict(saddle(64), model=net, **more), model=net, **more)
     for models in ([net, path], (path, path)):
-        assert np.abs(predict(saddle(64), model=models) - twice).max() < 2 * CLOSE
+        assert np.abs(predict(saddle(64), model=models, **more) - twice).max() < 2 * CLOSE
     with pytest.raises(OptionError, match="empty"):
         predict(saddle(64), model=[])
 
@@ -256,9 +259,9 @@ np.save("alone.npy", result.mesh.vertices)
 for workers in (0, 1):
     for item in gso.hybrid.solve_many([points], net=twice, workers=workers, verdict=False):
         show(item.result)
-# Loading ONNX Runtime pays where PyTorch would not be worth it, or is missing.
-for preset in ("balanced", "accurate"):
-    show(gso.hybrid.solve(points, net=twice, sparing=True, options=preset, verdict=False))
+# The decision whether a net pays needs no PyTorch either.
+sparing = gso.hybrid.solve(points, net=twice, sparing=True, options="accurate", verdict=False)
+assert sparing.warm_start in ("net", "cold")
 main(["optimize", "points.npy", "-o", "out.npz", "--method", "hybrid", "--net", twice, "--quiet"],
      standalone_mode=False)
 print(gso.Result.load("out.npz").details["net"])
@@ -266,7 +269,7 @@ print("torch" in sys.modules)
 """
     *said, file, loaded = run_without("torch,safetensors", code, tmp_path).splitlines()
     starts, iterations, nets = zip(*(line.split(",", 2) for line in said), strict=True)
-    assert starts == ("net",) * 7 + ("cold", "net")
+    assert starts == ("net",) * 7
     assert iterations[3:5] == ("2", "0") and iterations[5:7] == iterations[:1] * 2
     assert nets[:3] == (str(twice), str(once), f"{twice}, {once}")
     assert (file, loaded) == (str(twice), "False")

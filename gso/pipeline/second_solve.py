@@ -20,8 +20,6 @@ from gso.verdict import Code
 #: Factor by which a solve may raise the curvature of the one whose result it improves, and the
 #: share of the other's strain below which it may have any curvature.
 _RISE, _GAIN = 1.5, 0.5
-#: Excess of the distance from a warm start up to which a cold solve is likely to be near enough.
-_BARELY = 1.1
 #: Reasons that a bound on the distance and more fairness may remove.
 _MENDED = {
     Code.STRAIN,
@@ -82,7 +80,8 @@ class _Solves:
         for other in self._others(request, first):
             result = self._result(other)
             if excess(result) < excess(best):
-                best, near = result, other.max_displacement is not None
+                bound = other.max_displacement is not None or other.terms != request.terms
+                best, near = result, bound
             if best.usable or self._cancelled:
                 break
         if best is first:
@@ -115,7 +114,7 @@ class _Solves:
         """Return the judged result of a request."""
         run, own = self.run, self.run.case.solver_request
         asked = (request.formulation, request.options, request.max_displacement)
-        key = (*asked, request.weight_factor, request.x0 is None)
+        key = (*asked, request.weight_factor, request.x0 is None, request.terms)
         if key not in self._found:
             result = conclude(run, run.solve() if request is own else run(request))
             if request is not own:
@@ -123,11 +122,6 @@ class _Solves:
             self._cancelled |= result.status is Status.CANCELLED
             self._found[key] = result
         return self._found[key]
-
-    def _warm(self, request: Request[Options]) -> bool:
-        """Whether a request begins with a start that a cold solve may replace."""
-        given = request.x0 is not None and request.start.guarded
-        return given and not self.run.start_refused
 
     def _others(self, request: Request[Options], first: Result) -> Iterator[Request[Options]]:
         """Return other requests, if they may remove the reasons against a result."""
@@ -137,9 +131,6 @@ class _Solves:
             return
         if Code.CROSSES_ITSELF in codes and crossings(case.design).size:
             return
-        if self._warm(request) and codes == {Code.FAR} and excess(first) <= _BARELY:
-            # A cold solve, which is often as near as that, takes less time than those by `others`.
-            yield replace(request, x0=None)
         yield from others(case.analysis, request, bool(codes - {Code.FAR}))
 
 

@@ -13,11 +13,14 @@ from typing import TypeVar
 import numpy as np
 
 from gso import metrics, parametrization
+from gso.energy import Weighted, proximity
+from gso.energy.losses import Beyond
+from gso.mesh import Mesh
+from gso.mesh.normals import vertex_normals
 from gso.status import Status
 from gso.tasks.base import Analysis, Runner, Solution
 from gso.tasks.base import Options as BaseOptions
 from gso.tasks.developable import joint_isometry
-from gso.tasks.developable.objective import BOUNDED
 from gso.tasks.developable.options import DEVELOPABLE, NEAR, Options
 from gso.tasks.developable.target import (
     PROGRESS,
@@ -35,6 +38,11 @@ R = TypeVar("R", bound=Request[BaseOptions])
 _HARDER = (1.0, 6.0, 36.0)
 #: Largest distance of a usable result, from a design in the unit ball, whose size is 2.
 _USABLE = 2.0 * NEAR
+#: Displacement, a little below the usable one, beyond which solves near the design penalise the
+#: square of the excess, and the weight of that. And factors on their weights of curvature and
+#: fairness, which are tried in turn.
+_SOFT, _SOFT_WEIGHT = 0.92 * _USABLE, 100.0
+_SOFT_FACTORS = ((1.0, 1.0), (4.0, 3.0), (12.0, 4.0))
 #: Factor on the elongation in a solve by isometry near the design: its iterations end before a
 #: boundary that has grown is short again.
 _BORDERS = 3.0
@@ -115,8 +123,9 @@ def near_design(
 ) -> Iterator[SearchRequest]:
     """Yield requests whose results stay near the design, for where one without limits does not.
 
-    First by the same formulation: where the result was not `strained` with the same weights, and
-    then with those for results that are bounded. Then, for "isometry", by that of the surface it
+    First by the same formulation. Displacements beyond the bound are penalised, which leaves the
+    surface smoother than a hard bound, with growing weights: where the result was not `strained`
+    with the same ones. Then the bound is hard. Then, for "isometry", by that of the surface it
     starts from, and else by "isometry", if the user did not name one and did not ask for a fast
     solve, without the bound first. There are none with constraints, B-splines or the settings of a
     reference.
@@ -126,15 +135,12 @@ def near_design(
     if reference or options.variables == "surface" or not analysis.constraints.empty:
         return
     near = replace(request, x0=None, max_displacement=_USABLE)
-    if not strained and isinstance(options, Options):
-        curvature, fairness, proximity = BOUNDED
-        same = replace(
-            options,
-            w_fairness=options.w_fairness / fairness,
-            w_proximity=options.w_proximity / proximity,
-        )
-        factor = request.weight_factor / curvature
-        yield replace(near.with_options(same), weight_factor=factor)
+    if isinstance(options, Options):
+        soft = replace(request, x0=None, terms=(*request.terms, _beyond))
+        for curvature, fairness in _SOFT_FACTORS[strained:]:
+            smoother = replace(options, w_fairness=fairness * options.w_fairness)
+            factor = curvature * request.weight_factor
+            yield replace(soft.with_options(smoother), weight_factor=factor)
     yield _with_borders(near)
     if isinstance(options, joint_isometry.Options):
         yield replace(near.with_options(Options()), formulation="curvature")
@@ -145,6 +151,12 @@ def near_design(
         # the same surface from a design and its copies.
         yield _with_borders(replace(other, max_displacement=None))
         yield _with_borders(other)
+
+
+def _beyond(mesh: Mesh) -> list[Weighted]:
+    """Build the term against displacements beyond the soft bound."""
+    moved = proximity.build(mesh, vertex_normals(mesh))
+    return [Weighted(replace(moved, name="displacement"), _SOFT_WEIGHT, Beyond(_SOFT))]
 
 
 def _with_borders(request: SearchRequest) -> SearchRequest:
