@@ -423,3 +423,59 @@ def test_creases_are_less_fair_where_that_holds_the_distance():
     found = LineStrips(mesh).within(wanted)
     assert found.surface.strips == 6
     assert found.surface.farthest <= wanted.max_deviation
+
+
+def awning(u, v):
+    """A bilinear patch that sags, with a straight outline."""
+    sag = 2.4 * u * (1 - u) * v * (1 - v)
+    return 4 * u, 3 * v, 2.2 + 0.7 * u + 1.2 * v - 1.6 * u * v - sag
+
+
+def wave(u, v):
+    slope = 0.5 * np.sin(2 * u + 0.4) * (1 + 0.3 * v)
+    return 3 * u + 0.2 * v * v, 2 * v, slope + 0.15 * u * v * v
+
+
+def canopy(u, v):
+    return 2 * u, 3 * v + 0.3 * u * u, 0.4 * np.cos(1.3 * v - 0.2) * np.cos(1.1 * u) + 0.1 * u * v
+
+
+def sampled(make, rows=17, columns=13):
+    u, v = np.linspace(0, 1, rows)[:, None], np.linspace(0, 1, columns)[None]
+    return np.stack(np.broadcast_arrays(*make(u, v)), axis=-1)
+
+
+@pytest.mark.parametrize("digits", [6, 9])
+def test_rounded_coordinates_of_a_straight_outline_change_nothing(digits):
+    exact = sampled(awning, 31, 23)
+    far = [
+        LineStrips(scaled(points)).strips(4).surface.farthest
+        for points in (exact, exact.round(digits))
+    ]
+    assert far[1] == pytest.approx(far[0], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("make", "bound"),
+    [
+        (awning, 0.03),
+        pytest.param(wave, 0.01, marks=pytest.mark.slow),
+        pytest.param(canopy, 0.01, marks=pytest.mark.slow),
+    ],
+)
+@pytest.mark.parametrize("way", ["transposed", "flipped", "both", "turned in space"])
+def test_the_number_of_strips_does_not_depend_on_the_way_round_of_a_grid(make, bound, way):
+    points = sampled(make).round(6)
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ [[1, 0, 0], [0, c, -s], [0, s, c]]
+    other = {
+        "transposed": points.transpose(1, 0, 2),
+        "flipped": points[::-1],
+        "both": points[:, ::-1].transpose(1, 0, 2),
+        "turned in space": points @ turn.T,
+    }[way]
+    results = [gso.strips(np.ascontiguousarray(p), max_deviation=bound) for p in (points, other)]
+    assert [result.ruled.strips for result in results] == [3, 3]
+    assert all(result.usable for result in results)
+    far = [result.ruled.farthest for result in results]
+    assert far[1] == pytest.approx(far[0], rel=0.1)

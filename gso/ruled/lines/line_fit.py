@@ -42,6 +42,9 @@ _STIFF, _ROUNDS, _SHIFTED, _EXACT = 1e6, 3, 4, 1e-13
 _ACROSS = 0.01
 #: Weight of the barrier against folds, and the least area of triangles relative to the design's.
 _FACING, _LEAST = 1e-2, 0.2
+#: Double area of triangles, relative to the square of the longest side, up to which their corners
+#: count as points on a line. The sign of such an area is noise, and the barrier would hold it.
+_THIN = 1e-3
 #: Weight of the places of vertices.
 _PLACES = 0.3
 #: Iterations of each round.
@@ -193,7 +196,8 @@ class LineFitter:
         a, b, c = v[ids].transpose(1, 0, 2)
         normal, ways = cross(b - a, c - a), unit(self.normals[ids].mean(axis=1))
         area = np.einsum("kd,kd->k", normal, ways)
-        kept = area > 0.1 * lengths(normal)
+        longest = np.maximum.reduce([lengths(b - a), lengths(c - b), lengths(a - c)])
+        kept = area > np.maximum(0.1 * lengths(normal), _THIN * longest**2)
         ids, ways = ids[kept], ways[kept] / area[kept, None]
         return facing(number[ids], ways, mean_weights(len(ids)), least=_LEAST)
 
