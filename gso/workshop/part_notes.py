@@ -13,6 +13,7 @@ from gso.workshop.certificate import chord
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made, Panel
 from gso.workshop.part import Part
+from gso.workshop.parts import Fitted
 from gso.workshop.writers.pdf import on_page
 
 #: Angle in degrees from which on a bend counts for pleats, and number of changes between up and
@@ -22,18 +23,19 @@ _PLEATED, _TURNS = 2.0, 4
 _COARSE = 5e-4
 
 
-def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
+def strip_notes(fitted: Fitted, record: Json) -> list[str]:
     """Return notes on the strips of a design: folds, tight bends, steep creases, small parts.
 
-    Panels that are developable as they are do not count: their folds and bends are meant.
+    Radii are those of the surface, whatever the thickness of the sheet. Panels that are developable
+    as they are do not count: their folds and bends are meant.
 
     Parameters
     ----------
-    panels : sequence of Panel
-        With patterns in millimetres.
+    fitted : Fitted
     record : dict
         Of the design, in millimetres.
     """
+    panels = fitted.made.panels
     own = [k for k, panel in enumerate(panels) if not panel.is_kept]
     if "crease_angle_max" not in record or not own:
         return []
@@ -51,7 +53,7 @@ def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
     return list(
         said(
             np.array([bend.angle for bend in bends]),
-            np.array([bend.radius for bend in bends]),
+            fitted.scale * np.array([bend.radius for bend in bends]),
             record["size"],
             record["crease_angle_max"],
             100.0 * min(areas[k] for k in own) / sum(areas),
