@@ -35,7 +35,7 @@ from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
 from gso.wording import logged, places
 from gso.workshop.assembly_view import front
-from gso.workshop.certificate import design_record, digest, versions
+from gso.workshop.certificate import add_sheets, design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.constrained import check_formulation
@@ -463,6 +463,7 @@ def fabricate(
                     "notes": list(nested.notes),
                 }
             )
+    add_sheets(records, sheets)
     certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
