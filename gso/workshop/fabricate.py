@@ -16,7 +16,7 @@ from gso.constraints import Constraint, listed, record_of
 from gso.errors import OptionError
 from gso.exact import EXACT, as_it_is
 from gso.in_browser import in_notebook, open_file, picture
-from gso.io import SPLINE_SUFFIXES, Solid, suffix_of
+from gso.io import Solid, check_unit
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import (
@@ -296,11 +296,7 @@ def fabricate(
         most = finish.room(size, per_unit)
     say = logged(callback)
     for path in filter(None, map(path_of, several(designs))):
-        if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
-            raise OptionError(
-                f"{path}: CAD files have a unit of their own, and are read in millimetres; leave "
-                "out the unit"
-            )
+        check_unit(path, unit)
     place = Path(os.fsdecode(folder))
     held = tuple(listed(constraints))
     every = designs_of(
