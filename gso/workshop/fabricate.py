@@ -46,11 +46,13 @@ from gso.workshop.job_folder import CERTIFICATE, PAGE, SOLIDS, WORK, opened, pat
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
-from gso.workshop.output_files import Drawings, written
+from gso.workshop.output_files import Drawings, beside, written
 from gso.workshop.page_data import Shown
+from gso.workshop.page_views import Views
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.part_notes import (
+    book_notes,
     guide_notes,
     outline_notes,
     page_notes,
@@ -428,10 +430,7 @@ def fabricate(
         "versions": versions(),
         "designs": records,
         "sheets": [],
-        "notes": [
-            *dict.fromkeys(notes),
-            *guide_notes(records, settings),
-        ],
+        "notes": [*dict.fromkeys(notes), *guide_notes(records, settings)],
     }
     sheets: list[Drawing] = []
     if size is not None and parts:
@@ -463,7 +462,10 @@ def fabricate(
     certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
-    files = written(place, parts, sheets, shown, certificate, drawings, earlier, solids)
+    views = Views(shown, certificate)
+    if paper is not None:
+        certificate["notes"] += book_notes(beside(parts), paper, len(views.step_texts()))
+    files = written(place, parts, sheets, views, certificate, drawings, earlier, solids)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)

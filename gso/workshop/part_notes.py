@@ -12,13 +12,15 @@ from gso.wording import places
 from gso.workshop.certificate import chord
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made, Panel
-from gso.workshop.part import Part
+from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import Fitted
-from gso.workshop.writers.pdf import on_page
+from gso.workshop.writers.pdf import PAPERS, on_page, page_count
 
 #: Angle in degrees from which on a bend counts for pleats, and number of changes between up and
 #: down in one part that make a note.
 _PLEATED, _TURNS = 2.0, 4
+#: Number of pages of a PDF that a note is made of.
+_BOOK = 50
 #: Distance of outlines from smooth curves that a note is made of, relative to the design's size.
 _COARSE = 5e-4
 
@@ -71,6 +73,28 @@ def page_notes(parts: Sequence[Part], paper: str) -> list[str]:
     return [
         f"{places('part', large)} {verb} larger than a page ({paper}), and on several pages of the "
         "PDF; a smaller model or larger paper avoids that"
+    ]
+
+
+def book_notes(drawing: Drawing, paper: str, steps: int = 0) -> list[str]:
+    """Return a note on a PDF of many pages.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        All parts.
+    paper : str
+    steps : int
+        Number of the steps of joining, which have pages of their own.
+    """
+    count = page_count(drawing, paper, steps) if drawing.parts else 0
+    if count < _BOOK:
+        return []
+    largest = max(PAPERS.values()) == PAPERS[paper]
+    return [
+        f"the PDF has {count} pages of {paper}: each part that fits has one of its own, and larger "
+        f"ones have several; a smaller model{'' if largest else ' or larger paper'} makes fewer "
+        "where parts are divided to fit"
     ]
 
 
