@@ -11,16 +11,23 @@ from gso.typing import Array, Json
 from gso.wording import listed
 
 
-def facts(mesh: Mesh) -> list[tuple[str, str]]:
+def facts(mesh: Mesh, unit: str = "") -> list[tuple[str, str]]:
     """Return names and values of the properties of a mesh, as texts.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    unit : str
+        Name of the unit of its coordinates, which lengths are given with; empty if not known.
 
     Examples
     --------
     >>> from gso.mesh import Mesh
-    >>> known = dict(facts(Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])))
+    >>> known = dict(facts(Mesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]]), "cm"))
     >>> known["kind"], known["diagonal"]
-    ('triangles', '5')
+    ('triangles', '5 cm')
     """
+    own = f" {unit}" if unit else ""
     used = mesh.used
     points = mesh.vertices[used]
     length = mesh.edge_lengths
@@ -33,11 +40,14 @@ def facts(mesh: Mesh) -> list[tuple[str, str]]:
         ("components", str(np.unique(mesh.components[used]).size)),
         ("boundary loops", f"{len(loops)}" + (f" ({listed(loops)} vertices)" if loops else "")),
         ("Euler characteristic", str(mesh.euler_characteristic)),
-        ("bounding box", " x ".join(f"{side:.6g}" for side in np.ptp(points, axis=0))),
-        ("from, to", " ".join(map(_point, (points.min(axis=0), points.max(axis=0))))),
-        ("diagonal", f"{mesh.diagonal:.6g}"),
-        ("size", f"{_sizes(mesh)} (farthest vertex from the centroid)"),
-        ("edge length", f"{length.min():.4g} to {length.max():.4g}, mean {length.mean():.4g}"),
+        ("bounding box", " x ".join(f"{side:.6g}" for side in np.ptp(points, axis=0)) + own),
+        ("from, to", " ".join(map(_point, (points.min(axis=0), points.max(axis=0)))) + own),
+        ("diagonal", f"{mesh.diagonal:.6g}{own}"),
+        ("size", f"{_sizes(mesh)}{own} (farthest vertex from the centroid)"),
+        (
+            "edge length",
+            f"{length.min():.4g} to {length.max():.4g}{own}, mean {length.mean():.4g}{own}",
+        ),
     ]
     if mesh.stars:
         positive, negative, absolute = average(measure.curvature_features, mesh)

@@ -473,6 +473,21 @@ def test_info(run, small):
     assert "1 vertices belong to no face" in second
 
 
+def test_info_has_the_unit_that_is_given(run, small):
+    text = run("info", small, "--unit", "cm").stdout
+    known = dict(line.strip().split("  ", 1) for line in text.splitlines()[1:])
+    for name in ("bounding box", "from, to", "diagonal", "edge length"):
+        assert known[name].endswith(" cm")
+    assert " cm (farthest vertex" in known["size"]
+    assert known["bounding box"].strip() == "1 x 1 x 0.1 cm"
+    assert " cm" not in run("info", small).stdout and " mm" not in run("info", small).stdout
+    (record,) = json.loads(run("info", small, "--unit", "cm", "--json").stdout)
+    assert record["unit"] == "cm" and record["bounding box"] == "1 x 1 x 0.1 cm"
+    (record,) = json.loads(run("info", small, "--json").stdout)
+    assert record["unit"] is None and record["bounding box"] == "1 x 1 x 0.1"
+    assert refused(run("info", "a.step", "--unit", "m"), "a.step", "leave out the unit")
+
+
 @pytest.mark.parametrize(
     ("mesh", "kind"),
     [

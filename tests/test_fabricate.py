@@ -255,6 +255,30 @@ def test_groups_that_a_file_lacks_are_named(tmp_path):
         gso.fabricate(tmp_path / "dome.obj", tmp_path / "out", keep_groups=True, workers=0)
 
 
+def test_the_certificate_says_on_which_sheets_parts_lie(tmp_path):
+    # Three plates, two of which are alike, on sheets that have room for one.
+    plates = [
+        Mesh([[x, 0, 0], [x + long, 0, 0], [x + long, 40, 0], [x, 40, 0]], [[0, 1, 2, 3]])
+        for x, long in ((0, 90), (100, 80), (200, 90))
+    ]
+    job = gso.fabricate(
+        plates, tmp_path, sheet=(100.0, 50.0), workers=0, formats=("svg",), seconds=1
+    )
+    parts = [part for one in job.certificate["designs"] for part in one["parts"]]
+    for part in parts:
+        assert len(part["sheets"]) == part["count"]
+        drawn = part["same_as"] or part["name"]
+        for number in part["sheets"]:
+            assert [one.name for one in job.sheets[number - 1].parts] == [drawn]
+    assert sorted(number for part in parts for number in part["sheets"]) == [1, 2, 3]
+    assert (
+        json.loads((tmp_path / "certificate.json").read_text())["designs"][0]["parts"]
+        == (job.certificate["designs"][0]["parts"])
+    )
+    bare = gso.fabricate(plates[0], tmp_path / "bare", workers=0, formats=("svg",))
+    assert bare.certificate["designs"][0]["parts"][0]["sheets"] == []
+
+
 @pytest.mark.slow
 def test_a_design_larger_than_a_sheet_is_cut_to_fit(tmp_path):
     pytest.importorskip("spyrrow")

@@ -213,6 +213,21 @@ class TestSheets:
         np.testing.assert_allclose(thickened(panel, outside).radii, [4.5, 5.0])
         np.testing.assert_allclose(thickened(panel, Thickness(0.5, radius=0.7)).radii, 0.7)
 
+    def test_notes_on_tight_bends_have_radii_of_the_surface(self, strips, tmp_path, monkeypatch):
+        radius = min(panel.radii.min() for panel in strips.panels)
+        # A design so large that its tightest bend is worth a note.
+        record = strips.record | {"size": 1001.0 * radius}
+        monkeypatch.setattr("gso.workshop.work.made", lambda *_: replace(strips, record=record))
+        finish = Finish(thickness=Thickness(2.5 * radius))
+        given = {"workers": 0, "finish": finish, "formats": ("svg",)}
+        job = gso.fabricate(small(), tmp_path / "out", **given)
+        (note,) = (note for note in job.certificate["notes"] if "tighter" in note)
+        assert f"with radii from {radius:.3g} mm" in note
+        # No inner radius is negative.
+        parts = job.certificate["designs"][0]["parts"]
+        assert min(part["bend_radius_min"] for part in parts) == 0.0
+        assert min(bend.radius for part in job.parts for bend in part.bends) == 0.0
+
     def test_a_table_begins_at_no_bend(self):
         sheet = Thickness(2.0, face="outside", table=[[np.pi / 2, 4.0]])
         assert sheet.change(0.0) == pytest.approx(0.0)

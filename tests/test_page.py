@@ -65,7 +65,7 @@ def indices(data: dict, entry: dict) -> np.ndarray:
 
 def data_of(certificate, parts, views) -> dict:
     data = data_for_page(views.shown, parts, certificate)
-    return data | {"bytes": base64.b64decode(data["arrays"])}
+    return data | {"bytes": data["arrays"]}
 
 
 def data_points(html: str, data: dict) -> np.ndarray:

@@ -135,6 +135,28 @@ def test_faces_larger_than_a_page_are_parts_of_their_own(tmp_path):
     assert all(any(part.name in page for page in text) for part in job.parts)
 
 
+def test_many_pages_are_said(tmp_path):
+    finish = Finish(tabs=5.0, notches=None)
+
+    def said(folder, paper):
+        job = gso.fabricate(
+            house(), folder, scale=150.0, formats=(), paper=paper, finish=finish, workers=0
+        )
+        count = len(pypdf.PdfReader(folder / "parts.pdf").pages)
+        return count, [x for x in job.certificate["notes"] if x.startswith("the PDF has")]
+
+    count, (note,) = said(tmp_path / "a", "A4")
+    assert count >= 50 and note.startswith(f"the PDF has {count} pages of A4: ")
+    assert "larger paper" in note
+    count, none = said(tmp_path / "b", "A1")
+    assert count < 50 and not none
+    name = write(house().replaced(150.0 * house().vertices), tmp_path / "house.obj")
+    words = ["unfold", name, "-o", str(tmp_path / "house.pdf"), "--paper", "A4"]
+    done = CliRunner().invoke(main, words)
+    count = len(pypdf.PdfReader(tmp_path / "house.pdf").pages)
+    assert count >= 50 and f"note: the PDF has {count} pages of A4: " in done.output
+
+
 @pytest.mark.parametrize("place", ["inside", "outside"])
 def test_numbers_stand_inside_or_outside(tmp_path, place):
     for tabs in (None, 5.0):

@@ -293,3 +293,18 @@ def test_the_command_makes_the_same_strips(tmp_path):
     np.testing.assert_array_equal(made.pattern.flat, wanted.pattern.flat)
     wrong = CliRunner().invoke(main, ["strips", files[0], "-o", files[1], "--strips", "few"])
     assert wrong.exit_code == 1 and "it must be a number, 'auto' or None" in wrong.output
+
+
+@pytest.mark.parametrize("asked", [{}, {"strips": 2}, {"strips": "auto", "max_crease": 20.0}])
+def test_several_components_are_refused_before_any_solve(asked, monkeypatch):
+    def begin(*args, **keywords):
+        raise AssertionError("the solve began")
+
+    for name in ("strip_ways.exact_strips", "strip_ways.LightDesign.of", "surface_strips.solve"):
+        monkeypatch.setattr(f"gso.ruled.paneling.{name}", begin)
+    one = cap()
+    count = len(one.vertices)
+    points = np.concatenate([one.vertices + 3.0 * k * np.eye(3)[0] for k in range(3)])
+    mesh = Mesh(points, np.concatenate([one.faces + count * k for k in range(3)]))
+    with pytest.raises(gso.MeshError, match=r"3 components: .*gso\.fabricate"):
+        gso.strips(mesh, **asked)

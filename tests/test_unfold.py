@@ -17,6 +17,7 @@ from gso import Mesh, MeshError, OptionError
 from gso.cli import main
 from gso.unfolding import join_patches
 from gso.workshop import Finish, fitted, of_net, parts_from
+from tests.conftest import cylinder, saddle, sphere_cap
 
 GOLD = 0.5 * (1.0 + np.sqrt(5.0))
 ROOT = np.sqrt(2.0)
@@ -418,6 +419,26 @@ def test_same_net_for_every_numbering_and_place():
         other = made(new, table[rng.permutation(len(table))])
         assert len(other) == len(one)
         assert other.cut_length == pytest.approx(one.cut_length, rel=1e-9)
+
+
+def test_smooth_surfaces_that_are_doubly_curved_are_said():
+    def said(grid, **options):
+        mesh = Mesh.from_grid(grid)
+        both = (mesh.vertices, mesh.faces), (mesh.vertices, mesh.triangles)
+        nets = (gso.unfold(given, effort=0.0, **options) for given in both)
+        return {any("doubly curved" in note for note in net.notes) for net in nets}
+
+    assert said(sphere_cap(21, radius=1.0)) == {True}
+    assert said(saddle(21)) == {True}
+    # A cylinder is developable, but not with the coordinates of a text file.
+    assert said(cylinder(21)) == {False}
+    assert said(cylinder(21).round(6)) == {True}
+    # Low-poly models are meant to be folded, and sharp edges to be cut.
+    assert said(sphere_cap(9)) == {False}
+    half = np.linspace(0.0, np.pi, 241)
+    around = np.c_[np.cos(half), np.sin(half)]
+    net = gso.unfold(prism(around, 0.5), effort=0.0)
+    assert not any("doubly curved" in note for note in net.notes)
 
 
 def test_same_input_gives_the_same_net():

@@ -78,26 +78,32 @@ def _compare(before: Mesh, after: Mesh) -> tuple[dict[str, float | None], list[s
     example="gso info panel.obj\nprints its size, holes and curvature",
 )
 @click.argument("names", metavar="FILE...", nargs=-1, required=True, type=click.Path())
+@shared.unit
 @file_options.weld
 @shared.as_json
-def info(names: tuple[str, ...], weld: float | None, as_json: bool) -> None:
+def info(names: tuple[str, ...], unit: str, weld: float | None, as_json: bool) -> None:
     """Print properties of mesh files: size, connectivity, curvature. - is standard input.
 
-    If a file cannot be read, an error is printed for it and the exit code is 1.
+    Lengths have a unit if --unit says which, or if the file does. If a file cannot be read, an
+    error is printed for it and the exit code is 1.
     """
+    from gso import io
     from gso.cli import report
     from gso.mesh_facts import facts, facts_record
 
+    given = shared.named_unit(unit)
     failed, found = False, []
     for number, file in enumerate(names):
         try:
-            rows = facts(file_options.load(file, weld))
+            io.check_unit(file, unit)
+            own = "mm" if io.suffix_of(file) in io.SPLINE_SUFFIXES else given
+            rows = facts(file_options.load(file, weld), own)
         except GSOError as error:
             click.echo(f"gso: error: {' '.join(str(error).split())}", err=True)
             failed = True
             continue
         if as_json:
-            found.append({"file": file, **facts_record(rows)})
+            found.append({"file": file, "unit": own or None, **facts_record(rows)})
             continue
         if number:
             click.echo()

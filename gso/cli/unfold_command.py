@@ -98,7 +98,7 @@ def unfold(
     from gso.unfolding import unfold as make
     from gso.workshop import Finish, drawn, of_net, writers
     from gso.workshop.names import spelled
-    from gso.workshop.part_notes import page_notes
+    from gso.workshop.part_notes import book_notes, page_notes
     from gso.workshop.writers.pdf import SUFFIX, room
 
     writer = writers.check_output(out)
@@ -137,7 +137,7 @@ def unfold(
     parts = of_net(spelled(Path(name).stem), net)
     drawing, bare = drawn([parts], millimetres(unit), finish)
     if paper is not None:
-        bare += page_notes(drawing.parts, paper)
+        bare += [*page_notes(drawing.parts, paper), *book_notes(drawing, paper)]
     writers.write(drawing, out, **options)
     if page is not None:
         write_page(net, name, page, unit, finish=finish)

@@ -111,6 +111,19 @@ def check_spline(path: AnyPath, unit: str = "mm") -> None:
         raise GSOError(f"{os.fsdecode(path)}: {error}") from None
 
 
+def check_unit(path: AnyPath, unit: str) -> None:
+    """Raise an OptionError if a unit is given for a CAD file, which has one of its own.
+
+    >>> check_unit("panel.obj", "m")
+    >>> check_unit("bracket.step", "mm")
+    """
+    if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
+        raise OptionError(
+            f"{os.fsdecode(path)}: CAD files have a unit of their own, and are read in "
+            "millimetres; leave out the unit"
+        )
+
+
 def check_package(suffix: str) -> None:
     """Raise an error if the package for a CAD format, by its suffix, cannot be used."""
     kit = _KITS[suffix]

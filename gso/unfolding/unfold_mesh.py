@@ -31,6 +31,9 @@ Polygons: TypeAlias = "MeshLike | tuple[ArrayLike, Sequence[Sequence[int]]]"
 
 #: Angle in radians up to which an edge is exactly flat.
 _LEVEL = 1e-10
+#: Angle in radians up to which faces may meet for a smooth surface. Number of inner vertices on
+#: cuts, and their share of all inner ones, from which on a note says that the surface is smooth.
+_SMOOTH, _CUT, _SHARE = np.radians(10.0), 200, 0.5
 #: Gap between parts that are laid side by side, as a share of the largest.
 _GAP = 0.05
 
@@ -191,8 +194,31 @@ def net_of(
     notes = (*faces.mesh.notes, *notes)
     if opened := int((~whole & (np.abs(edges.angles) <= np.radians(flat_angle))).sum()):
         notes += (f"{opened} edges in flat faces were cut, as asked for or to save parts",)
+    corners = triangles.ravel()
+    sharp = corners[one[np.abs(edges.angles) > _SMOOTH]]
+    notes += _smooth_notes(faces.mesh, corners[one[~whole]], sharp)
     return Net(
         faces.mesh, faces.face, faces.vertex, pattern, joined.part, folded, flat_angle, notes
+    )
+
+
+def _smooth_notes(mesh: Mesh, cut: Ints, sharp: Ints) -> tuple[str, ...]:
+    """Return a note if a surface without sharp edges is cut at most of its inner vertices.
+
+    A surface that is exactly developable need not be cut there. `cut` and `sharp` are the vertices
+    of edges that are cut, and of those that are sharp.
+    """
+    inner = mesh.used & ~mesh.half_edges.boundary_vertex
+    is_cut = np.zeros(len(inner), bool)
+    is_cut[cut] = True
+    is_cut[sharp] = False
+    count, every = int((inner & is_cut).sum()), int(inner.sum())
+    if count < max(_CUT, _SHARE * every):
+        return ()
+    return (
+        "the surface is smooth, but doubly curved or not exactly developable: its faces are laid "
+        f"flat one by one, with cuts at {count} of {every} inner vertices; gso strips, gso pieces "
+        "or gso fabricate make developable parts near it",
     )
 
 

@@ -13,7 +13,7 @@ from gso.io.json_file import plain
 from gso.mesh import Mesh
 from gso.typing import Array, Json
 from gso.workshop.panels import Panel
-from gso.workshop.part import Part
+from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import Fitted
 from gso.workshop.traced_guides import is_curved
 
@@ -130,6 +130,38 @@ def part_record(panel: Panel, part: Part) -> Json:
         "notches": len(part.notches),
         "chord": chord(part.outline),
     }
+
+
+def add_sheets(records: Sequence[Json], sheets: Sequence[Drawing]) -> None:
+    """Add to the record of each part the numbers of its sheets, in order: one for each copy.
+
+    Copies of parts that are alike are given out in the order of their records.
+
+    Parameters
+    ----------
+    records : sequence of dict
+        Of designs, whose parts have ``count`` and ``same_as``; they are changed.
+    sheets : sequence of Drawing
+        The first one has the number 1.
+
+    Examples
+    --------
+    >>> square = Part("a", np.zeros((4, 2)))
+    >>> parts = [{"name": "a", "same_as": None, "count": 1},
+    ...          {"name": "b", "same_as": "a", "count": 2}]
+    >>> add_sheets([{"parts": parts}], [Drawing((square, square)), Drawing((square,))])
+    >>> [part["sheets"] for part in parts]
+    [[1], [1, 2]]
+    """
+    numbers: dict[str, list[int]] = {}
+    for number, drawing in enumerate(sheets, start=1):
+        for part in drawing.parts:
+            numbers.setdefault(part.name, []).append(number)
+    for record in records:
+        for entry in record.get("parts", ()):
+            free = numbers.get(entry["same_as"] or entry["name"], [])
+            entry["sheets"] = free[: entry["count"]]
+            del free[: entry["count"]]
 
 
 def chord(outline: Array) -> float:

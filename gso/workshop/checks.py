@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gso import metrics
-from gso.typing import Array, Flags
+from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare, ordered
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
@@ -34,8 +34,10 @@ def judge_sheet(own: Fitted, settings: FabricationSettings, finish: Finish) -> t
         return ordered(known)
     parts: list[tuple[str, Row]] = []
     for panel, before in zip(own.panels, own.made.panels, strict=True):
-        radius = own.scale * bend_radius(before)
-        rows = _bends(panel, sheet) if len(panel.bends) else _rolled(radius, settings, sheet)
+        if len(panel.bends):
+            rows = _bends(panel, own.scale * before.radii, sheet)
+        else:
+            rows = _rolled(own.scale * bend_radius(before), settings, sheet)
         parts += [(panel.name, row) for row in rows]
     reasons = [
         *known,
@@ -78,10 +80,10 @@ def _rolled(radius: float, settings: FabricationSettings, sheet: Thickness) -> I
     yield Code.NEUTRAL_STRAIN, sheet.strain(1.0 / radius), settings.strain
 
 
-def _bends(panel: Panel, sheet: Thickness) -> Iterator[Row]:
-    """Measure the bends of a panel."""
+def _bends(panel: Panel, radii: Array, sheet: Thickness) -> Iterator[Row]:
+    """Measure the bends of a panel, whose surface has some radii there (b,)."""
     if panel.rolled.any():
-        yield from _sharpest(panel, panel.rolled, sheet)
+        yield _sharpest(panel.angles[panel.rolled], radii[panel.rolled], sheet)
     folded = ~panel.rolled
     if not folded.any():
         return
@@ -90,17 +92,17 @@ def _bends(panel: Panel, sheet: Thickness) -> Iterator[Row]:
         last = float(np.degrees(np.asarray(sheet.table, float)[-1, 0]))
         yield Code.BEND_ANGLE, float(turn.max()), last
     elif sheet.radius is None:
-        yield from _sharpest(panel, folded, sheet)
+        yield _sharpest(panel.angles[folded], radii[folded], sheet)
     else:
         yield Code.TOOL_RADIUS, sheet.radius, _SHARPEST * sheet.sheet
         yield from _nearest(panel, sheet)
 
 
-def _sharpest(panel: Panel, bends: Flags, sheet: Thickness) -> Iterator[Row]:
-    """Measure the smallest radius of some bends, which are rolled to that of the surface."""
-    k = int(np.where(bends, panel.radii, np.inf).argmin())
-    depth = float(sheet.depth(panel.angles[k]))
-    yield Code.TOO_THICK, float(panel.radii[k]) + depth, max(depth, _SHARPEST * sheet.sheet)
+def _sharpest(angles: Array, radii: Array, sheet: Thickness) -> Row:
+    """Measure the bend of the smallest inner radius, which is rolled to that of the surface."""
+    depth = sheet.depth(angles)
+    k = int((radii - depth).argmin())
+    return Code.TOO_THICK, float(radii[k]), max(float(depth[k]), _SHARPEST * sheet.sheet)
 
 
 def _nearest(panel: Panel, sheet: Thickness) -> Iterator[Row]:

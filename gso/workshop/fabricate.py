@@ -16,7 +16,7 @@ from gso.constraints import Constraint, listed, record_of
 from gso.errors import OptionError
 from gso.exact import EXACT, as_it_is
 from gso.in_browser import in_notebook, open_file, picture
-from gso.io import SPLINE_SUFFIXES, Solid, suffix_of
+from gso.io import Solid, check_unit
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import (
@@ -35,7 +35,7 @@ from gso.typing import AnyPath, Array, Json
 from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
 from gso.wording import logged, places
 from gso.workshop.assembly_view import front
-from gso.workshop.certificate import design_record, digest, versions
+from gso.workshop.certificate import add_sheets, design_record, digest, versions
 from gso.workshop.checks import judge_sheet
 from gso.workshop.congruent import origins, united
 from gso.workshop.constrained import check_formulation
@@ -46,11 +46,13 @@ from gso.workshop.job_folder import CERTIFICATE, PAGE, SOLIDS, WORK, opened, pat
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
 from gso.workshop.nesting import Rotations, checked_options, nest
-from gso.workshop.output_files import Drawings, written
+from gso.workshop.output_files import Drawings, beside, written
 from gso.workshop.page_data import Shown
+from gso.workshop.page_views import Views
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.part_notes import (
+    book_notes,
     guide_notes,
     outline_notes,
     page_notes,
@@ -296,11 +298,7 @@ def fabricate(
         most = finish.room(size, per_unit)
     say = logged(callback)
     for path in filter(None, map(path_of, several(designs))):
-        if unit != "mm" and suffix_of(path) in SPLINE_SUFFIXES:
-            raise OptionError(
-                f"{path}: CAD files have a unit of their own, and are read in millimetres; leave "
-                "out the unit"
-            )
+        check_unit(path, unit)
     place = Path(os.fsdecode(folder))
     held = tuple(listed(constraints))
     every = designs_of(
@@ -384,7 +382,7 @@ def fabricate(
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
-        said = [*strip_notes(fit.panels, record), *pleat_notes(fit.panels)]
+        said = [*strip_notes(fit, record), *pleat_notes(fit.panels)]
         said += outline_notes(fit.panels, record)
         said += without_tabs(bare) if asked.tabs else []
         if page is not None and paper is not None:
@@ -432,10 +430,7 @@ def fabricate(
         "versions": versions(),
         "designs": records,
         "sheets": [],
-        "notes": [
-            *dict.fromkeys(notes),
-            *guide_notes(records, settings),
-        ],
+        "notes": [*dict.fromkeys(notes), *guide_notes(records, settings)],
     }
     sheets: list[Drawing] = []
     if size is not None and parts:
@@ -463,10 +458,14 @@ def fabricate(
                     "notes": list(nested.notes),
                 }
             )
+    add_sheets(records, sheets)
     certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
-    files = written(place, parts, sheets, shown, certificate, drawings, earlier, solids)
+    views = Views(shown, certificate)
+    if paper is not None:
+        certificate["notes"] += book_notes(beside(parts), paper, len(views.step_texts()))
+    files = written(place, parts, sheets, views, certificate, drawings, earlier, solids)
     certificate["files"] = files
     certificate["seconds"] = time.perf_counter() - clock
     write_json(place / CERTIFICATE, certificate)

@@ -13,7 +13,6 @@ from gso.typing import Json, Keywords
 from gso.workshop import writers
 from gso.workshop.job_folder import CERTIFICATE, PAGE, PAPER, SOLIDS
 from gso.workshop.page import page_html
-from gso.workshop.page_data import Shown
 from gso.workshop.page_views import Views
 from gso.workshop.part import Drawing, Part
 from gso.workshop.writers import strokes
@@ -71,7 +70,7 @@ def written(
     place: Path,
     parts: Sequence[Part],
     sheets: Sequence[Drawing],
-    shown: Sequence[Shown],
+    views: Views,
     certificate: Json,
     drawings: Drawings,
     earlier: Set[str],
@@ -79,8 +78,6 @@ def written(
 ) -> list[str]:
     """Write all files but the certificate; delete earlier ones that are not written again."""
     files: list[str] = []
-
-    views = Views(shown, certificate)
 
     def write(drawing: Drawing, name: str, suffix: str, **more: Any) -> None:
         (place / name).parent.mkdir(exist_ok=True)
@@ -97,7 +94,7 @@ def written(
         found = {part.name: views.place(part.name) for part in parts}
         at = {name: (one[0], one[2]) for name, one in found.items() if one is not None}
         write(beside(parts), PAPER, "pdf", places=at, steps=views.step_texts())
-    for one in shown:
+    for one in views.shown:
         for panel in one.made.panels:
             name = f"surfaces/{panel.name}.obj"
             (place / name).parent.mkdir(exist_ok=True)

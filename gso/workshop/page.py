@@ -78,7 +78,7 @@ def page_html(
         *(f"<p>{escape(note)}</p>" for note in certificate["notes"]),
         "</main>",
         _packed("page-data", json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
-        _packed("page-arrays", base64.b64decode(arrays)),
+        _packed("page-arrays", arrays),
         _packed("page-script", _file("page.js").encode()),
         f"<script>{_file('boot.js')}</script>",
         "</body></html>",

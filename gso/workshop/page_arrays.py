@@ -1,8 +1,6 @@
-"""Arrays of a page as one base64 text, and where each of them is in it."""
+"""Arrays of a page as one block of bytes, and where each of them is in it."""
 
 from __future__ import annotations
-
-import base64
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,8 +24,8 @@ class Arrays:
     {'at': 0, 'count': 2, 'columns': 2, 'low': [0.0, 5.0], 'step': [1.52592548e-05, 0.0]}
     >>> arrays.indices([[0, 1], [1, 2]])
     {'at': 8, 'count': 2, 'columns': 2, 'bits': 16}
-    >>> len(arrays.text())
-    24
+    >>> len(arrays.content())
+    16
     """
 
     def __init__(self) -> None:
@@ -52,9 +50,9 @@ class Arrays:
         bits = 16 if table.max(initial=0) <= _LEVELS else 32
         return self._add(table.astype(f"<u{bits // 8}")) | {"bits": bits}
 
-    def text(self) -> str:
-        """Return all of them as base64."""
-        return base64.b64encode(bytes(self._bytes)).decode()
+    def content(self) -> bytes:
+        """Return all of them, one after another."""
+        return bytes(self._bytes)
 
     def _add(self, table: np.ndarray) -> Json:
         at = len(self._bytes)

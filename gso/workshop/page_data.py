@@ -82,8 +82,8 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
     Returns
     -------
     dict
-        JSON-compatible. ``arrays`` is the base64 text with the numbers, in which the entries
-        ``at``, ``count`` and ``columns`` say where an array is. ``designs`` have ``name``,
+        JSON-compatible but for ``arrays``: bytes with the numbers, in which the entries ``at``,
+        ``count`` and ``columns`` say where an array is. ``designs`` have ``name``,
         ``mesh`` and ``motions``; ``panels`` their design, their part, ``points`` in place,
         ``flat``, ``triangles``, edges of ``rim`` and ``bends``, and ``values`` at the points;
         ``seams`` the two panels, lengths and ``line``; ``parts`` what the certificate says;
@@ -130,7 +130,7 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
     ]
     out["values"] = {name: {"unit": unit, "text": said} for name, (unit, said) in VALUES.items()}
     data: Json = plain(out)
-    return data | {"arrays": arrays.text()}
+    return data | {"arrays": arrays.content()}
 
 
 def _design(one: Shown, arrays: Arrays) -> Json:

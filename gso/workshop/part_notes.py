@@ -12,28 +12,32 @@ from gso.wording import places
 from gso.workshop.certificate import chord
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.panels import Made, Panel
-from gso.workshop.part import Part
-from gso.workshop.writers.pdf import on_page
+from gso.workshop.part import Drawing, Part
+from gso.workshop.parts import Fitted
+from gso.workshop.writers.pdf import PAPERS, on_page, page_count
 
 #: Angle in degrees from which on a bend counts for pleats, and number of changes between up and
 #: down in one part that make a note.
 _PLEATED, _TURNS = 2.0, 4
+#: Number of pages of a PDF that a note is made of.
+_BOOK = 50
 #: Distance of outlines from smooth curves that a note is made of, relative to the design's size.
 _COARSE = 5e-4
 
 
-def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
+def strip_notes(fitted: Fitted, record: Json) -> list[str]:
     """Return notes on the strips of a design: folds, tight bends, steep creases, small parts.
 
-    Panels that are developable as they are do not count: their folds and bends are meant.
+    Radii are those of the surface, whatever the thickness of the sheet. Panels that are developable
+    as they are do not count: their folds and bends are meant.
 
     Parameters
     ----------
-    panels : sequence of Panel
-        With patterns in millimetres.
+    fitted : Fitted
     record : dict
         Of the design, in millimetres.
     """
+    panels = fitted.made.panels
     own = [k for k, panel in enumerate(panels) if not panel.is_kept]
     if "crease_angle_max" not in record or not own:
         return []
@@ -51,7 +55,7 @@ def strip_notes(panels: Sequence[Panel], record: Json) -> list[str]:
     return list(
         said(
             np.array([bend.angle for bend in bends]),
-            np.array([bend.radius for bend in bends]),
+            fitted.scale * np.array([bend.radius for bend in bends]),
             record["size"],
             record["crease_angle_max"],
             100.0 * min(areas[k] for k in own) / sum(areas),
@@ -69,6 +73,28 @@ def page_notes(parts: Sequence[Part], paper: str) -> list[str]:
     return [
         f"{places('part', large)} {verb} larger than a page ({paper}), and on several pages of the "
         "PDF; a smaller model or larger paper avoids that"
+    ]
+
+
+def book_notes(drawing: Drawing, paper: str, steps: int = 0) -> list[str]:
+    """Return a note on a PDF of many pages.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        All parts.
+    paper : str
+    steps : int
+        Number of the steps of joining, which have pages of their own.
+    """
+    count = page_count(drawing, paper, steps) if drawing.parts else 0
+    if count < _BOOK:
+        return []
+    largest = max(PAPERS.values()) == PAPERS[paper]
+    return [
+        f"the PDF has {count} pages of {paper}: each part that fits has one of its own, and larger "
+        f"ones have several; a smaller model{'' if largest else ' or larger paper'} makes fewer "
+        "where parts are divided to fit"
     ]
 
 

@@ -123,6 +123,8 @@ class Thickness:
     def inner(self, angle: ArrayLike, radius: ArrayLike) -> Array:
         """Return the inner radii of bends, infinite where a bend table leaves them to the tool.
 
+        They are 0 where the sheet is too thick for the radius of the surface.
+
         Parameters
         ----------
         angle, radius : array_like
@@ -133,7 +135,7 @@ class Thickness:
             return np.full(angles.shape, np.inf)
         if self.radius is not None:
             return np.full(angles.shape, float(self.radius))
-        return np.asarray(radii - self.depth(angles))
+        return np.asarray(np.maximum(radii - self.depth(angles), 0.0))
 
     def strain(self, curvature: float) -> float:
         """Return how far the neutral surface of a rolled sheet is strained against the design's.

@@ -32,6 +32,7 @@ from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import (
     along_lines,
     case_of,
+    check_connected,
     check_whole,
     lines_of,
     of_surface,
@@ -97,6 +98,8 @@ class StripsTask:
     def solved(self) -> Result:
         """Return the whole or the pieces: what holds the limits, or else the closest."""
         asked = self.request
+        if self.whole and not self.divisible:
+            check_connected(self.design)
         tried = self._developable()
         if tried and (tried[0].holds or crosses_itself(tried[0].reasons)):
             return self._answer(tried)

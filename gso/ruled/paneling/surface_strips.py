@@ -55,13 +55,19 @@ def wanted(options: Options, bound: float | None, size: float) -> Wanted:
     )
 
 
+def check_connected(mesh: Mesh) -> None:
+    """Raise a MeshError if a mesh has several components."""
+    count = len(np.unique(mesh.components[mesh.used]))
+    if count > 1:
+        raise MeshError(
+            f"strips take one surface, and this mesh has {count} components: make those of each on "
+            "its own, or take gso.fabricate, which makes the parts of all"
+        )
+
+
 def check_whole(mesh: Mesh) -> None:
     """Raise a MeshError unless a surface is a disk, possibly with holes."""
-    if len(np.unique(mesh.components[mesh.used])) > 1:
-        raise MeshError(
-            f"strips take one surface, and this mesh has {mesh.components.max() + 1} components: "
-            "make those of each on its own, or take gso.fabricate, which makes the parts of all"
-        )
+    check_connected(mesh)
     if not parametrization.flattens(mesh) or parametrization.opened(mesh).cut is not None:
         raise MeshError(
             "strips need a surface with a boundary that does not close around itself and has no "

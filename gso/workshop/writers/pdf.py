@@ -36,8 +36,8 @@ PAPERS = {
     "A4": (210.0, 297.0),
 }
 
-# Margin of the pages, in millimetres.
-_MARGIN = 10.0
+# Margin of the pages, and by how much they overlap, in millimetres.
+_MARGIN, _OVERLAP = 10.0, 10.0
 # Points in a millimetre, and the line width in millimetres.
 _POINT, _LINE = 72.0 / 25.4, 0.25
 # Height of capital letters as a fraction of the font size (Helvetica).
@@ -60,7 +60,7 @@ def content(
     layers: dict[str, Layer],
     *,
     paper: str = "A4",
-    overlap: float = 10.0,
+    overlap: float = _OVERLAP,
     margin: float = _MARGIN,
     bend_text: bool = False,
     places: Mapping[str, tuple[Picture, Sequence[Array]]] | None = None,
@@ -105,10 +105,9 @@ def content(
     """
     check_paper(paper)
     gap, free = as_positive(overlap, "overlap", zero=True), as_positive(margin, "margin", zero=True)
-    some = [(own, tiled(own, PAPERS[paper], gap, free)) for own in _divided(drawing, paper, free)]
+    some = _tilings(drawing, paper, gap, free)
     stream = io.BytesIO()
-    count = sum(len(t.tiles) + (len(t.tiles) > 1) for _, t in some) + -(-len(steps) // _EACH)
-    book = _Book(stream, free, gap, count)
+    book = _Book(stream, free, gap, _count(some, len(steps)))
     for own, tiling in some:
         if len(tiling.tiles) > 1:
             book.overview(own, tiling, layers)
@@ -120,6 +119,17 @@ def content(
         book.steps(PAPERS[paper], steps[first : first + _EACH])
     book.close()
     return stream.getvalue()
+
+
+def page_count(drawing: Drawing, paper: str, steps: int = 0) -> int:
+    """Return the number of pages that :func:`content` makes of parts and of some steps.
+
+    >>> plate = Part("plate", np.array([[0.0, 0], [300, 0], [300, 150], [0, 150]]))
+    >>> page_count(Drawing((plate,)), "A3"), page_count(Drawing((plate,)), "A4", steps=7)
+    (1, 5)
+    """
+    check_paper(paper)
+    return _count(_tilings(drawing, paper, _OVERLAP, _MARGIN), steps)
 
 
 def room(paper: str, margin: float = _MARGIN) -> tuple[float, float]:
@@ -149,6 +159,20 @@ def on_page(part: Part, paper: str, margin: float = _MARGIN) -> Part | None:
         return part.turned(0.5 * np.pi)
     angle, (long, short) = rectangle(part.outline, (high, wide))
     return part.turned(0.5 * np.pi - angle) if long <= high and short <= wide else None
+
+
+def _tilings(
+    drawing: Drawing, paper: str, overlap: float, margin: float
+) -> list[tuple[Drawing, Tiling]]:
+    """Return the drawings that pages are made of, each with its pages."""
+    own = _divided(drawing, paper, margin)
+    return [(one, tiled(one, PAPERS[paper], overlap, margin)) for one in own]
+
+
+def _count(some: Sequence[tuple[Drawing, Tiling]], steps: int) -> int:
+    """Count pages of drawings, with a page before several of one drawing, and those of steps."""
+    own = sum(len(tiling.tiles) + (len(tiling.tiles) > 1) for _, tiling in some)
+    return own + -(-steps // _EACH)
 
 
 def _divided(drawing: Drawing, paper: str, margin: float) -> list[Drawing]:
