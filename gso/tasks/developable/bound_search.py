@@ -156,7 +156,7 @@ def near_design(
 def _beyond(mesh: Mesh) -> list[Weighted]:
     """Build the term against displacements beyond the soft bound."""
     moved = proximity.build(mesh, vertex_normals(mesh))
-    return [Weighted(replace(moved, name="displacement"), _SOFT_WEIGHT, Beyond(_SOFT))]
+    return [Weighted(replace(moved, name="beyond the distance"), _SOFT_WEIGHT, Beyond(_SOFT))]
 
 
 def _with_borders(request: SearchRequest) -> SearchRequest:
