@@ -21,6 +21,7 @@ from gso.status import Status
 from gso.tasks.base import Analysis, Runner, Solution
 from gso.tasks.base import Options as BaseOptions
 from gso.tasks.developable import joint_isometry
+from gso.tasks.developable.objective import BOUNDED
 from gso.tasks.developable.options import DEVELOPABLE, NEAR, Options
 from gso.tasks.developable.target import (
     PROGRESS,
@@ -123,9 +124,10 @@ def near_design(
 ) -> Iterator[SearchRequest]:
     """Yield requests whose results stay near the design, for where one without limits does not.
 
-    First by the same formulation. Displacements beyond the bound are penalised, which leaves the
-    surface smoother than a hard bound, with growing weights: where the result was not `strained`
-    with the same ones. Then the bound is hard. Then, for "isometry", by that of the surface it
+    First by the same formulation. On grids, displacements beyond the bound are penalised, which
+    leaves the surface smoother than a hard bound, with growing weights: where the result was not
+    `strained` with the same ones. On other meshes rounding grows in these solves, and the bound is
+    hard, with the same weights where the result was not `strained`. Then the bound is hard. Then, for "isometry", by that of the surface it
     starts from, and else by "isometry", if the user did not name one and did not ask for a fast
     solve, without the bound first. There are none with constraints, B-splines or the settings of a
     reference.
@@ -135,12 +137,21 @@ def near_design(
     if reference or options.variables == "surface" or not analysis.constraints.empty:
         return
     near = replace(request, x0=None, max_displacement=_USABLE)
-    if isinstance(options, Options):
+    if isinstance(options, Options) and analysis.mesh.grid_index is not None:
         soft = replace(request, x0=None, terms=(*request.terms, _beyond))
         for curvature, fairness in _SOFT_FACTORS[strained:]:
             smoother = replace(options, w_fairness=fairness * options.w_fairness)
             factor = curvature * request.weight_factor
             yield replace(soft.with_options(smoother), weight_factor=factor)
+    elif isinstance(options, Options) and not strained:
+        curvature, fairness, near_own = BOUNDED
+        same = replace(
+            options,
+            w_fairness=options.w_fairness / fairness,
+            w_proximity=options.w_proximity / near_own,
+        )
+        factor = request.weight_factor / curvature
+        yield replace(near.with_options(same), weight_factor=factor)
     yield _with_borders(near)
     if isinstance(options, joint_isometry.Options):
         yield replace(near.with_options(Options()), formulation="curvature")
