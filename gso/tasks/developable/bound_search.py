@@ -127,10 +127,10 @@ def near_design(
     First by the same formulation. On grids, displacements beyond the bound are penalised, which
     leaves the surface smoother than a hard bound, with growing weights: where the result was not
     `strained` with the same ones. On other meshes rounding grows in these solves, and the bound is
-    hard, with the same weights where the result was not `strained`. Then the bound is hard. Then, for "isometry", by that of the surface it
-    starts from, and else by "isometry", if the user did not name one and did not ask for a fast
-    solve, without the bound first. There are none with constraints, B-splines or the settings of a
-    reference.
+    hard, with the same weights where the result was not `strained`. Then the bound is hard. Then,
+    for "isometry", by that of the surface it starts from, and else by "isometry", if the user did
+    not name one and did not ask for a fast solve, without the bound first. There are none with
+    constraints, B-splines or the settings of a reference.
     """
     options = request.options
     reference = isinstance(options, joint_isometry.Options) and options.begin == "design"
