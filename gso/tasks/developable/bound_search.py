@@ -124,12 +124,12 @@ def near_design(
 ) -> Iterator[SearchRequest]:
     """Yield requests whose results stay near the design, for where one without limits does not.
 
-    First by the same formulation. On grids, displacements beyond the bound are penalised, which
-    leaves the surface smoother than a hard bound, with growing weights: where the result was not
-    `strained` with the same ones. On other meshes rounding grows in these solves, and the bound is
-    hard, with the same weights where the result was not `strained`. Then the bound is hard. Then,
-    for "isometry", by that of the surface it starts from, and else by "isometry", if the user did
-    not name one and did not ask for a fast solve, without the bound first. There are none with
+    First by the same formulation. On grids, displacements beyond the bound are penalised, with
+    growing weights of curvature and fairness, which leaves the surface smoother than a hard bound.
+    On other meshes, where rounding grows in these solves, the bound is hard. Both begin with the
+    same weights, unless the result was `strained`. Then the bound is hard, with its usual weights.
+    Then, for "isometry", by that of the surface it starts from, and else by "isometry", if the user
+    did not name one and did not ask for a fast solve, without the bound first. There are none with
     constraints, B-splines or the settings of a reference.
     """
     options = request.options
@@ -144,11 +144,11 @@ def near_design(
             factor = curvature * request.weight_factor
             yield replace(soft.with_options(smoother), weight_factor=factor)
     elif isinstance(options, Options) and not strained:
-        curvature, fairness, near_own = BOUNDED
+        curvature, fairness, closeness = BOUNDED
         same = replace(
             options,
             w_fairness=options.w_fairness / fairness,
-            w_proximity=options.w_proximity / near_own,
+            w_proximity=options.w_proximity / closeness,
         )
         factor = request.weight_factor / curvature
         yield replace(near.with_options(same), weight_factor=factor)
