@@ -4,10 +4,11 @@ Each function returns faces or edges in the numbering of the mesh; an empty arra
 """
 
 from gso.faults.crossings import crossings, crossings_at_vertices
-from gso.faults.folds import SHORT, collapsed, folded
+from gso.faults.folds import PLEATED, SHORT, collapsed, folded
 from gso.faults.overlaps import overlapping, overlaps
 
 __all__ = [
+    "PLEATED",
     "SHORT",
     "collapsed",
     "crossings",

@@ -58,6 +58,7 @@ INFO: dict[str, Info] = {
     "flats": Info("", None, "faces of flat regions where strips meet", "sum"),
     "rulings": Info("", None, "lines to bend along", "sum"),
     "rulings_crossed": Info("", True, "pairs of successive rulings that cross", "sum"),
+    "pleat_max": Info("deg", True, "largest pleat of a strip, see the reason PLEATED", "max"),
     "bend_radius_min": Info("size", False, "smallest radius at a ruling, mesh's unit", "min"),
     "crease_angle_max": Info("deg", True, "largest angle at a crease between strips", "max"),
     "crease_angle_p90": Info("deg", True, "angle at creases that 90 % of them are below", "max"),

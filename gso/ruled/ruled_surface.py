@@ -16,6 +16,7 @@ from gso.mesh import Mesh, Nearest
 from gso.mesh.topology import pair_keys
 from gso.pattern import Bend, Folded, Pattern
 from gso.ruled.fold_lines import Folds, folds
+from gso.ruled.pleats import pleats
 from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.strip_fit import Fit, Job
 from gso.ruled.trim import trimmed
@@ -59,6 +60,9 @@ class RuledSurface:
         seams, which are not cut, for those divided for a sheet, and in files of earlier versions.
     deviation : Distances or None
         Its distances from the design, where they are known; see :meth:`distances`.
+    pleats : ndarray, (strips,), or None
+        The largest pleat of each strip in radians, where it is known; see
+        :func:`gso.ruled.pleats.pleats`.
     strain : float or None
         The largest strain of the pattern, for a design that is kept as it is: by the equations of
         its faces, as edges of the mesh are chords of round faces. None where it is measured.
@@ -74,6 +78,7 @@ class RuledSurface:
     crossed: int
     untrimmed: Untrimmed | None = None
     deviation: metrics.Distances | None = None
+    pleats: Array | None = None
     strain: float | None = None
 
     __repr__ = short_repr
@@ -89,6 +94,21 @@ class RuledSurface:
         """The largest distance from the design, both ways; 0 where it is not known."""
         far = self.deviation
         return 0.0 if far is None else far.largest
+
+    @property
+    def pleat_max(self) -> float:
+        """The largest pleat in degrees; 0 where it is not known."""
+        return 0.0 if self.pleats is None else float(np.degrees(self.pleats.max(initial=0.0)))
+
+    @property
+    def pleated(self) -> bool:
+        """Whether a strip is known to be pleated."""
+        return self.pleat_max > faults.PLEATED
+
+    @property
+    def flaws(self) -> int:
+        """2 for a surface that is not sound, 1 for one that is pleated, else 0."""
+        return 1 if self.sound and self.pleated else 2 * (not self.sound)
 
     @property
     def strains(self) -> dict[str, float]:
@@ -126,12 +146,26 @@ class RuledSurface:
         return Folded(ends[found], self.rulings.angles[at], self.rulings.radii[at])
 
     def on(self, design: Mesh, *, parts: bool = False) -> RuledSurface:
-        """Return the surface with a design's vertices moved to it, and its distances from it.
+        """Return the surface with a design's vertices moved to it, measured against it.
 
         See :meth:`distances` for `parts`.
         """
         moved = Nearest(self.mesh).locate(design.vertices)[2]
-        return replace(self, moved=moved, deviation=self.distances(design, parts=parts))
+        return replace(self, moved=moved).measured(design, parts=parts)
+
+    def measured(self, design: Mesh, *, parts: bool = False, sampled: bool = False) -> RuledSurface:
+        """Return the surface with its distances from a design, and its pleats.
+
+        See :meth:`distances` for `parts` and `sampled`.
+        """
+        far = self.distances(design, parts=parts, sampled=sampled)
+        return replace(self, deviation=far).measured_pleats(design)
+
+    def measured_pleats(self, design: Mesh) -> RuledSurface:
+        """Return the surface with its pleats, near a design."""
+        return replace(
+            self, pleats=pleats(self.mesh, self.strip, self.rulings, self.creases, design)
+        )
 
     @property
     def bends(self) -> list[Bend]:

@@ -310,7 +310,10 @@ class _Strips:
         )
         made = line_surface(design, polygons, np.array(nodes.points))
         return replace(
-            made, moved=surface.moved, deviation=surface.deviation, crossed=surface.crossed
+            made.measured_pleats(design),
+            moved=surface.moved,
+            deviation=surface.deviation,
+            crossed=surface.crossed,
         )
 
 

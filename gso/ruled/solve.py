@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -69,10 +69,10 @@ class Wanted:
         return any(bound is not None for bound in bounds)
 
     def met(self, surface: RuledSurface) -> bool:
-        """Return whether a surface with known deviation is sound and meets the bounds."""
+        """Return whether a measured surface is sound, not pleated, and meets the bounds."""
         far, turn, radius = self.max_deviation, self.max_crease, self.min_radius
         return (
-            surface.sound
+            not surface.flaws
             and (radius is None or surface.rulings.smallest_radius >= radius)
             and (far is None or surface.farthest <= far * (1.0 + _TIGHT))
             and (turn is None or surface.creases.largest_angle <= turn)
@@ -96,6 +96,11 @@ class Found:
     mean: float
     start: str
 
+    @classmethod
+    def of(cls, surface: RuledSurface, start: str) -> Found:
+        """Return a measured surface with its mean distance."""
+        return cls(surface, 0.0 if surface.deviation is None else surface.deviation.mean, start)
+
     @property
     def ends(self) -> Array:
         """Ends of the rulings before trimming."""
@@ -103,9 +108,9 @@ class Found:
         return self.surface.mesh.vertices if source is None else source.vertices
 
     @property
-    def order(self) -> tuple[bool, float]:
-        """Sort key: sound surfaces first, then by distance."""
-        return not self.surface.sound, self.mean + 0.2 * self.surface.farthest
+    def order(self) -> tuple[int, float]:
+        """Sort key: surfaces with fewer flaws first, then by distance."""
+        return self.surface.flaws, self.mean + 0.2 * self.surface.farthest
 
 
 def solve(
@@ -180,7 +185,7 @@ class _Search:
         if wanted.strips is None and met:
             return results[met[0]]
         every = results.values()
-        return min(every, key=lambda f: (not f.surface.sound, f.surface.farthest), default=None)
+        return min(every, key=lambda f: (f.surface.flaws, f.surface.farthest), default=None)
 
     def run(self, starts: dict[str, Array]) -> None:
         """Fit one strip from each start, and halve strips until the bounds are met."""
@@ -239,13 +244,8 @@ class _Search:
 
     def _found(self, job: Job, fit: Fit, start: str) -> Found:
         """Lower the largest distance of a fit, and measure the surface that it is."""
-        surface = built(job, evened(job, fit))
-        far = surface.distances(job.target.domain.mesh)
-        return Found(
-            replace(surface, deviation=far),
-            far.mean,
-            start,
-        )
+        surface = built(job, evened(job, fit)).measured(job.target.domain.mesh)
+        return Found.of(surface, start)
 
 
 def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:

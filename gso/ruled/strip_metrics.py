@@ -26,6 +26,8 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
     They have no Gaussian curvature, so there is none here. Distances are measured all over both
     surfaces; each is the larger one of both directions.
     """
+    if surface.pleats is None:
+        surface = surface.measured_pleats(design)
     true = surface.deviation or surface.distances(design)
     percent = 100.0 / design.diagonal
     flat, sheet = surface.pattern.flat, surface.pattern.surface(surface.mesh)
@@ -41,6 +43,7 @@ def strip_metrics(design: Mesh, surface: RuledSurface) -> dict[str, float]:
             "rulings": float(len(surface.rulings.edges)),
             "flats": float(np.count_nonzero(surface.flat)),
             "rulings_crossed": float(surface.crossed),
+            "pleat_max": surface.pleat_max,
             "bend_radius_min": surface.rulings.smallest_radius,
         }
         | _creases(surface.creases, surface.mesh.vertices, percent)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from gso.faults import SHORT
+from gso.faults import PLEATED, SHORT
 from gso.status import Status
 
 #: Relative tolerance of the limits.
@@ -192,6 +192,16 @@ class Code(str, enum.Enum):
         "Pairs of successive rulings that cross.",
         "pairs of successive rulings that cross: {value}",
         "allow more strips (strips)",
+    )
+    PLEATED = _limit(
+        "pleated",
+        Kind.ANGLE,
+        "Size of a pleat: of two neighbouring bends of a strip in opposite directions, the smaller "
+        "angle, less what the design turns there.",
+        "strips are pleated: their bends go up and down in turn by {value}, more than {bound}, "
+        "where the design does not",
+        "allow more strips (strips), or less distance (max_deviation)",
+        limit=PLEATED,
     )
     TOO_THICK = _limit(
         "too_thick",

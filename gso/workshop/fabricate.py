@@ -382,7 +382,8 @@ def fabricate(
         record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
         why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
-        said = [*strip_notes(fit, record), *pleat_notes(fit.panels)]
+        said = strip_notes(fit, record)
+        said += [] if any(r.code is Code.PLEATED for r in why) else pleat_notes(fit.panels)
         said += outline_notes(fit.panels, record)
         said += without_tabs(bare) if asked.tabs else []
         if page is not None and paper is not None:

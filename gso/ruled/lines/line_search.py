@@ -36,11 +36,15 @@ _GOOD = 0.5
 _PLANAR = 0.2
 #: Fairness of creases where strips are far away otherwise.
 _NEARER = 0.05
-#: Whether to take the other kind of rulings, and fairness, one after the other until strips are
-#: sound and near; half of them for the second family. The second list is for strips that fold.
+#: Fairness of creases where strips are pleated otherwise.
+_EVEN, _EVENER = 2.0, 10.0
+#: Whether to take the other kind of rulings, and fairness, one after the other until strips have
+#: no flaws and are near; half of them for the second family. The other lists are for strips that
+#: fold, and for those that are pleated.
 _FIRST = (False, FAIR)
 _IF_FAR = ((False, _NEARER), (True, FAIR), (True, _NEARER))
 _IF_FOLDED = ((True, FAIR), (False, _NEARER), (True, _NEARER))
+_IF_PLEATED = ((False, _EVEN), (True, _EVEN), (False, _EVENER))
 _SETTINGS = 1 + len(_IF_FAR)
 #: Ratio to the largest allowed distance up to which less fair creases may hold it.
 _CLOSE = 1.3
@@ -179,15 +183,15 @@ class LineStrips:
         limit = _WORSE * self.predicted(half)
         own = len(self.choices)
         tried = self._tried(count, limit, self.choices, aim)
-        poor = all(_distance(found) > (False, limit) for found in tried)
+        poor = all(_distance(found) > (0, limit) for found in tried)
         if poor and not self.stopped and self.add_copies():
             tried += self._tried(count, limit, self.choices[own:], aim)
         if tried:
             best = self.results[count] = min(
                 tried,
-                key=lambda one: (not one.surface.sound, one.surface.farthest > aim, one.order),
+                key=lambda one: (one.surface.flaws, one.surface.farthest > aim, one.order),
             )
-            if half >= max(self.least, 2) and _distance(best) > (False, limit):
+            if half >= max(self.least, 2) and _distance(best) > (0, limit):
                 self._solve(half)
 
     def _tried(
@@ -199,7 +203,7 @@ class LineStrips:
         for place, (choice, lines) in enumerate(_candidates(count, choices)):
             least = min(least, choice.rank(count))
             alike = choice.rank(count) <= _ALIKE * least
-            if not alike and any(one.surface.sound and one.mean <= good for one in tried):
+            if not alike and any(not one.surface.flaws and one.mean <= good for one in tried):
                 break
             tried += self._settled(choice, lines, limit, _SETTINGS >> place, aim)
             good = _GOOD * choice.rank(count)
@@ -213,9 +217,10 @@ class LineStrips:
         most: int = _SETTINGS,
         aim: float = np.inf,
     ) -> list[Found]:
-        """Solve for strips by one setting after the other, until they are sound and near.
+        """Solve for strips by one setting after the other, until they have no flaws and are near.
 
-        Near is within `limit`, and not just beyond `aim`.
+        Near is within `limit`, and not just beyond `aim`. Fairer creases have smaller pleats and
+        larger distances, so that they are of no use where strips are pleated and far beyond `aim`.
         """
         tried: list[Found] = []
         settings = [_FIRST]
@@ -223,15 +228,16 @@ class LineStrips:
             found = self._solved(choice, lines, *settings[turn])
             if self.stopped:
                 break
-            sound = found is not None and found.surface.sound
+            flaws = 2 if found is None else found.surface.flaws
             if turn == 0:
-                settings += _IF_FAR if sound else _IF_FOLDED
+                settings += (_IF_FAR, _IF_PLEATED, _IF_FOLDED)[flaws]
             if found is None:
                 continue
             tried.append(found)
             far = found.surface.farthest
             enough = far <= limit and not aim < far <= _CLOSE * aim
-            if sound and (turn > 0 or enough):
+            hopeless = flaws == 1 and far > _CLOSE * aim
+            if hopeless or (not flaws and (turn > 0 or enough)):
                 break
         return tried
 
@@ -330,8 +336,7 @@ class LineStrips:
         except MeshError:
             # Corners that run together leave faces without area.
             return None
-        far = surface.distances(self.mesh, sampled=True)
-        return Found(replace(surface, deviation=far), far.mean, LINES)
+        return Found.of(surface.measured(self.mesh, sampled=True), LINES)
 
     def _fitter(self, mesh: Mesh) -> LineFitter:
         """Return what fits strips along the lines of a mesh."""
@@ -353,9 +358,9 @@ def _candidates(count: int, choices: Sequence[Choice]) -> list[tuple[Choice, Int
     return out
 
 
-def _distance(found: Found) -> tuple[bool, float]:
-    """Sort key: sound surfaces first, then by the largest distance."""
-    return not found.surface.sound, found.surface.farthest
+def _distance(found: Found) -> tuple[int, float]:
+    """Sort key: surfaces with fewer flaws first, then by the largest distance."""
+    return found.surface.flaws, found.surface.farthest
 
 
 def _gaps(polygons: Polygons, points: Array) -> float:

@@ -116,8 +116,7 @@ def _as_it_is(name: str, sheet: Sheet, request: StripsRequest) -> Part:
 def merged(joint: Joint, parts: Sequence[Part]) -> StripsResult:
     """Merge the parts into one result."""
     design, opened = joint.design, joint.shape.opened
-    surface = together([part.surface for part in parts], design)
-    surface = replace(surface, deviation=surface.distances(design, parts=True))
+    surface = together([part.surface for part in parts], design).measured(design, parts=True)
     points = opened.mesh.vertices.copy()
     for own, part in zip(joint.shape.parts, parts, strict=True):
         points[own.vertices] = part.surface.moved

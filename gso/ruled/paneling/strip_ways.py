@@ -48,6 +48,9 @@ from gso.verdict import Reason, crosses_itself, judge, ordered
 _FAR = 0.6
 #: Number of strips from which those along lines are nearer than others.
 _MANY = 8
+#: Number of strips, and distance over the predicted one, from which lines do not suit a design:
+#: rulings across them twist, and pieces may be fewer.
+_SEVERAL, _TWISTED = 6, 5.0
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,8 @@ class StripsTask:
                         f"{least} or more; ask for as many, or give max_deviation"
                     )
                 check_whole(light.mesh)
-            if not self.divisible or any(one.holds for one in tried):
+            held = any(one.holds for one in tried)
+            if not self.divisible or (held and not self._twisted(tried)):
                 return self._answer(tried)
         if self.division is None:
             # Seams of a design that is not symmetric are not symmetric: nothing else will do.
@@ -280,6 +284,14 @@ class StripsTask:
         if not allowed or len(np.unique(design.components[design.used])) > 1:
             return None
         return lines_of(design, asked)
+
+    def _twisted(self, tried: Sequence[Tried]) -> bool:
+        """Return whether there are several strips where lines promised far fewer."""
+        if self._lines is None or not self._counted:
+            return False
+        best = min(tried, key=lambda one: one.order(few=True))
+        far = _TWISTED * self._lines.predicted(best.strips) * self.design.diagonal
+        return best.strips >= _SEVERAL and best.far > far
 
     @property
     def _least(self) -> int:

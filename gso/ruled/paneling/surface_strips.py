@@ -176,7 +176,7 @@ def _parts(found: Found) -> int:
     return int(found.surface.pattern.mesh.components.max()) + 1
 
 
-def _preference(aim: Wanted, found: Found) -> tuple[bool, int, bool, float]:
+def _preference(aim: Wanted, found: Found) -> tuple[bool, int, int, float]:
     """Sort key: what meets the bounds first, then fewer parts, then what is nearer."""
     return not aim.met(found.surface), _parts(found), *found.order
 
