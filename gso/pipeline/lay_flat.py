@@ -86,7 +86,7 @@ def _low_strain(case: Case) -> Pattern | None:
 
 def _solved(case: Case) -> Pattern | None:
     """Return the pattern that the flatten task finds."""
-    return pattern_of(case, Run(case).solve())
+    return pattern_of(case, Run(case).solve(case.solver_request))
 
 
 def strains_of(surface: Mesh, executor: Executor = SERIAL) -> dict[str, float]:

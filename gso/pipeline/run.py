@@ -104,9 +104,8 @@ class Run:
         """Plan a request in the solver's frame."""
         return self.case.task.plan(self.analysis, request)
 
-    def solve(self) -> Solution:
-        """Solve the request of the case, by a search where it has limits."""
-        request = self.case.solver_request
+    def solve(self, request: Request[Options]) -> Solution:
+        """Solve a request from its start if that is usable, by a search where it has limits."""
         search = self.case.task.formulations[request.formulation].search
         if request.limits.given and search is not None:
             return search(self, request)

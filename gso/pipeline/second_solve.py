@@ -37,9 +37,10 @@ _MENDED = {
 def solve_and_judge(run: Run) -> Result:
     """Solve the case of a run; again, within a distance, where the result is not usable.
 
-    Where the user gave limits, the task searches for a result that holds them. Where there are
-    none, a result that strains too much, is too far away or folds is solved again, kept near the
-    design, by the same formulation and, where the user did not name it, by others. The first
+    Where the user gave limits, the task searches for a result that holds them; where a search from
+    a guarded start, as nets make it, finds none, it searches again from the design. Where there
+    are none, a result that strains too much, is too far away or folds is solved again, kept near
+    the design, by the same formulation and, where the user did not name it, by others. The first
     usable result is returned, or else the one that misses its limits by the smallest factor
     (:func:`excess`). Where the formulation improves the result of another one, that one is solved
     for in the same way, and returned where it is better (:func:`_is_worse`). A callback ends all
@@ -76,18 +77,16 @@ class _Solves:
     def usable(self, request: Request[Options]) -> Result:
         """Return the first usable result of a request and those near the design, or the best."""
         best = first = self._result(request)
-        near = True
+        kept = ""
         for other in self._others(request, first):
             result = self._result(other)
             if excess(result) < excess(best):
-                bound = other.max_displacement is not None or other.terms != request.terms
-                best, near = result, bound
+                best, kept = result, _kept(other, request)
             if best.usable or self._cancelled:
                 break
         if best is first:
             return first
         why = str(first.reasons[0]).partition(";")[0]
-        kept = ", that is kept near the design" if near else ""
         note = f"this is another solve, by {best.formulation!r}{kept}; of the first one {why}"
         return replace(best, notes=(*best.notes, note))
 
@@ -116,7 +115,8 @@ class _Solves:
         asked = (request.formulation, request.options, request.max_displacement)
         key = (*asked, request.weight_factor, request.x0 is None, request.terms)
         if key not in self._found:
-            result = conclude(run, run.solve() if request is own else run(request))
+            begun = request is own or request.limits.given
+            result = conclude(run, run.solve(request) if begun else run(request))
             if request is not own:
                 result.warm_start = "cold"
             self._cancelled |= result.status is Status.CANCELLED
@@ -127,11 +127,22 @@ class _Solves:
         """Return other requests, if they may remove the reasons against a result."""
         case, missed = self.run.case, first.status is Status.CONSTRAINTS_MISSED
         others, codes = case.task.others, {reason.code for reason in first.reasons}
+        from_net = case.request.start.guarded and request.x0 is not None
+        searched = request.limits.given and not (self.run.start_refused or self._cancelled)
+        if from_net and searched and codes:
+            yield replace(request, x0=None)
         if others is None or missed or not self.may_go_on or not codes or codes - _MENDED:
             return
         if Code.CROSSES_ITSELF in codes and crossings(case.design).size:
             return
         yield from others(case.analysis, request, bool(codes - {Code.FAR}))
+
+
+def _kept(other: Request[Options], request: Request[Options]) -> str:
+    """Say how another request differs from the first one; empty where only its formulation does."""
+    if other.max_displacement is not None or other.terms != request.terms:
+        return ", that is kept near the design"
+    return ", that begins with the design" if request.limits.given else ""
 
 
 def _is_worse(result: Result, other: Result) -> bool:

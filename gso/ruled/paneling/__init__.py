@@ -2,7 +2,7 @@
 
 :func:`gso.strips` (:mod:`~gso.ruled.paneling.lay_strips`) tries the design as one surface
 (:mod:`~gso.ruled.paneling.surface_strips`), and then in pieces
-(:mod:`~gso.ruled.paneling.piece_strips`). ``gso.optimize`` with ``formulation="ruled"`` and
+(:mod:`~gso.ruled.paneling.piece_strips`). ``gso.tno.optimize`` with ``formulation="ruled"`` and
 ``gso.fabricate`` ask the same function.
 """
 

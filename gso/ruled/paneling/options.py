@@ -10,7 +10,7 @@ import numpy as np
 from gso.errors import OptionError
 from gso.tasks import Options as BaseOptions
 
-#: The formulation of the developable task by which :func:`gso.optimize` makes strips.
+#: The formulation of the developable task by which :func:`gso.tno.optimize` makes strips.
 RULED = "ruled"
 #: Largest number of strips that are tried.
 MOST = 64
