@@ -485,7 +485,10 @@ def test_info_has_the_unit_that_is_given(run, small):
     assert record["unit"] == "cm" and record["bounding box"] == "1 x 1 x 0.1 cm"
     (record,) = json.loads(run("info", small, "--json").stdout)
     assert record["unit"] is None and record["bounding box"] == "1 x 1 x 0.1"
-    assert refused(run("info", "a.step", "--unit", "m"), "a.step", "leave out the unit")
+    for command in ("info", "unfold", "pieces", "strips", "optimize"):
+        out = () if command == "info" else ("-o", "a.svg")
+        done = run(command, "a.step", *out, "--unit", "m")
+        assert refused(done, "a.step", "leave out the unit")
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ import pytest
 import gso
 from gso import faults
 from gso.mesh import Mesh
-from gso.ruled.fold_lines import Folds
-from gso.ruled.pleats import pleats
+from gso.ruled import Folds, pleats
 from gso.verdict import Code
 
 NONE = Folds(np.empty((0, 2), np.int64), np.empty(0), np.empty(0))

@@ -70,10 +70,16 @@ def load(file: str, weld: float | None = None) -> Mesh:
 
 
 def _on_disk(file: str) -> str:
-    """Return a file's name, or that of a temporary file with what standard input holds."""
-    if file != STANDARD:
+    """Return a file's name, or that of a temporary file with what standard input holds.
+
+    A ``--unit`` for a CAD file, which has its own, is an OptionError.
+    """
+    from gso.io import check_unit
+
+    context = click.get_current_context(silent=True)
+    if file != STANDARD or context is None:
+        check_unit(file, "mm" if context is None else context.params.get("unit", "mm"))
         return file
-    context = click.get_current_context()
     if _STDIN not in context.meta:
         data = sys.stdin.buffer.read()
         if not data:

@@ -95,7 +95,6 @@ def info(names: tuple[str, ...], unit: str, weld: float | None, as_json: bool) -
     failed, found = False, []
     for number, file in enumerate(names):
         try:
-            io.check_unit(file, unit)
             own = "mm" if io.suffix_of(file) in io.SPLINE_SUFFIXES else given
             rows = facts(file_options.load(file, weld), own)
         except GSOError as error:

@@ -16,7 +16,7 @@ from gso.mesh import Mesh, Nearest
 from gso.mesh.topology import pair_keys
 from gso.pattern import Bend, Folded, Pattern
 from gso.ruled.fold_lines import Folds, folds
-from gso.ruled.pleats import pleats
+from gso.ruled.pleat_angles import pleats
 from gso.ruled.sheet import unrolled_pattern
 from gso.ruled.strip_fit import Fit, Job
 from gso.ruled.trim import trimmed
@@ -62,7 +62,7 @@ class RuledSurface:
         Its distances from the design, where they are known; see :meth:`distances`.
     pleats : ndarray, (strips,), or None
         The largest pleat of each strip in radians, where it is known; see
-        :func:`gso.ruled.pleats.pleats`.
+        :func:`gso.ruled.pleats`.
     strain : float or None
         The largest strain of the pattern, for a design that is kept as it is: by the equations of
         its faces, as edges of the mesh are chords of round faces. None where it is measured.
