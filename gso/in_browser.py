@@ -17,8 +17,8 @@ from gso.errors import GSOError
 def show(self: Any, *, unit: str = "mm", name: str = "result") -> None:
     """Open the page of the result in a browser; in a notebook, show its picture.
 
-    The page turns, and folds the patterns to their places. It is a temporary file, which is there
-    until Python ends: a script that shows a result should wait, for instance by ``input()``.
+    The page turns, and folds patterns to their places. It is a temporary file, which is there until
+    Python ends: a script that shows a result should wait, for instance by ``input()``.
 
     Parameters
     ----------
@@ -29,8 +29,6 @@ def show(self: Any, *, unit: str = "mm", name: str = "result") -> None:
 
     Raises
     ------
-    MeshError
-        The result has no flat pattern, as that of denoising.
     GSOError
         There is no browser.
     """

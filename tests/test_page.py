@@ -19,6 +19,7 @@ from urllib.request import url2pathname
 
 import numpy as np
 import pytest
+import trimesh
 from click.testing import CliRunner
 
 import gso
@@ -36,6 +37,7 @@ from gso.workshop import (
     sheet_drawing,
     step_pictures,
 )
+from gso.workshop.result_page import result_page
 from tests.browser import PROGRAM, Browser
 from tests.page_designs import html_of, job_of, vault
 
@@ -303,10 +305,37 @@ def test_a_result_has_a_page(tmp_path):
     data = json.loads(read(out.read_text(), "page-data"))
     (part,) = data["parts"]
     assert sorted([part["length"], part["width"]]) == pytest.approx([1000, 1000], rel=0.01)
-    denoised = gso.tno.optimize(arch(), task="denoise")
-    denoised.save(tmp_path / "flat.npz")
-    done = CliRunner().invoke(main, ["view", str(tmp_path / "flat.npz"), "-o", str(out)])
-    assert done.exit_code == 1 and "there is no pattern" in done.output
+
+
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_result_without_a_pattern_is_shown_in_space(parts, tmp_path):
+    file, out = tmp_path / "noisy.npz", tmp_path / "noisy.html"
+    mesh = gso.as_mesh(arch() + 0.01 * np.random.default_rng(0).normal(size=arch().shape))
+    every = np.concatenate([mesh.vertices + 3.0 * k for k in range(parts)])
+    count = len(mesh.vertices)
+    faces = np.concatenate([mesh.faces + k * count for k in range(parts)])
+    result = gso.tno.optimize(gso.Mesh(every, faces), task="denoise")
+    result.save(file)
+    done = CliRunner().invoke(main, ["view", str(file), "-o", str(out), "--unit", "m"])
+    assert done.exit_code == 0, done.output
+    text = out.read_text()
+    assert "noisy is as it was asked for" in text and "flat parts" not in text
+    assert f"roughness {result.metrics['roughness_ratio']:.3g} times the input" in text
+    assert "<h2>Parts" not in text and "<h2>Drawings" not in text and "<h2>Pictures" in text
+    data = json.loads(read(text, "page-data"))
+    assert len(data["panels"]) == parts and not data["parts"] and not data["seams"]
+    for panel in data["panels"]:
+        assert panel["part"] is None and panel["flat"] is None
+        assert panel["values"]["strain"] is None
+        # Vertices have moved by different distances.
+        assert isinstance(panel["values"]["deviation"], dict)
+
+
+def test_closed_surfaces_have_a_page():
+    ball = trimesh.creation.icosphere(1)
+    text = result_page(gso.tno.optimize(gso.as_mesh(ball), task="denoise"), "ball")
+    (panel,) = json.loads(read(text, "page-data"))["panels"]
+    assert panel["rim"]["count"] == 0 and panel["flat"] is None
 
 
 class TestCommands:
@@ -369,7 +398,9 @@ class TestCommands:
         assert np.ptp(data_points(out.read_text(), data), axis=0).min() > 0.4
         more[1] = str(tmp_path / "out.obj")
         done = CliRunner().invoke(main, ["optimize", file, "--task", "denoise", *more])
-        assert done.exit_code == 1 and "pages show flat patterns" in done.output
+        assert done.exit_code == 0, done.output
+        data = json.loads(read(out.read_text(), "page-data"))
+        assert data["panels"][0]["flat"] is None and not data["parts"]
 
 
 class TestShow:
@@ -410,7 +441,7 @@ class TestShow:
         monkeypatch.setattr("webbrowser.open", lambda address: False)
         with pytest.raises(gso.GSOError, match="there is no browser"):
             gso.unfold(box()).show()
-        with pytest.raises(gso.MeshError, match="there is no pattern"):
+        with pytest.raises(gso.GSOError, match="there is no browser"):
             gso.tno.optimize(arch(), task="denoise").show()
 
     def test_of_a_job(self, tmp_path, monkeypatch):

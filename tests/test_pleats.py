@@ -127,9 +127,20 @@ def test_strips_near_a_twisted_saddle_are_not_pleated():
     assert result.metrics["distance_max"] <= 2.0 + 1e-6
 
 
-def test_pleated_strips_are_not_usable():
-    with pytest.warns(gso.ConvergenceWarning, match="pleated"):
-        result = gso.strips(saddle(13), strips=2)
-    (reason,) = result.reasons
-    assert reason.code is Code.PLEATED and not result.usable
+def test_pleats_of_a_number_that_was_named_are_a_note():
+    """The nearest strips of this number were asked for."""
+    result = gso.strips(saddle(13), strips=2, options="fast")
+    assert result.usable and result.metrics["pleat_max"] > faults.PLEATED
+    assert any("pleated" in note for note in result.notes)
+
+
+def test_pleats_count_where_the_number_is_to_be_found():
+    """Of a twisted saddle no single strip within this distance is smooth."""
+    options = gso.RuledOptions(max_strips=1, starts=("design",))
+    with pytest.warns(gso.ConvergenceWarning):
+        # Under constraints it is not cut, and strips do not run along its lines.
+        result = gso.tno.optimize(
+            saddle(9), options=options, constraints=[gso.Fixed([40])], max_deviation="10%"
+        )
+    (reason,) = (reason for reason in result.reasons if reason.code is Code.PLEATED)
     assert reason.value == result.metrics["pleat_max"] > faults.PLEATED == reason.bound

@@ -109,10 +109,6 @@ class Job:
         from gso import io
 
         has_pattern = self.task == "developable" or tasks.get(self.task).flat
-        if page is not None and not has_pattern:
-            raise OptionError(
-                f"{page}: pages show flat patterns; use --task flatten or --task developable"
-            )
         if out.lower().endswith((".dxf", ".pdf")):
             raise OptionError(
                 f"{out}: patterns are written as .svg here; gso fabricate writes .dxf and .pdf"

@@ -22,7 +22,7 @@ def write_page(
     Raises
     ------
     MeshError
-        It has no flat pattern.
+        None of its pieces has a flat pattern.
     """
     from gso.io.atomic import write_bytes
     from gso.workshop.result_page import result_page

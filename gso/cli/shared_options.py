@@ -260,7 +260,7 @@ page = click.option(
     metavar="HTML",
     type=click.Path(),
     callback=_writable,
-    help="Page to look at in a browser (.html): it turns, and folds from the flat patterns.",
+    help="Page to look at in a browser (.html): it turns, and flat patterns fold to their places.",
 )
 
 

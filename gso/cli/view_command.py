@@ -24,7 +24,8 @@ from gso.cli.page_file import PAGES, write_page
 def view(file: str, out: str, unit: str, force: bool, quiet: bool) -> None:
     """Show the result FILE, .npz of gso optimize or gso strips, as a page for a browser.
 
-    The page turns, folds and explodes the patterns, and works without a network. gso optimize,
+    The page turns, folds and explodes the patterns, and works without a network. A surface without
+    a pattern, as of --task denoise, turns, and has heat maps. gso optimize,
     gso strips, gso unfold and gso loft write it with --page, gso pieces and gso fabricate in their
     folders.
     """

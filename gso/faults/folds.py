@@ -15,7 +15,7 @@ SHARP = -0.5
 #: Ratio of lengths, result over design, below which an edge has collapsed.
 SHORT = 0.02
 #: Size of a pleat in degrees beyond which strips are pleated; see :func:`gso.ruled.pleats`.
-PLEATED = 15.0
+PLEATED = 20.0
 #: Ratio of a corner triangle's height to its longer side below which it has no normal.
 _FLAT = 1e-6
 

@@ -52,6 +52,21 @@ def headline(result: Result, unit: str = "") -> str:
     return f"{said}: {'developable' if good else 'not developable'} {' and '.join(within)}"
 
 
+def measurement(result: Result) -> str:
+    """Say what the task changed: curvature, strain or roughness; empty where none was measured."""
+    found = result.metrics
+    if "mean_abs_K_before" in found:
+        change = f"{found['mean_abs_K_before']:.3g} -> {found['mean_abs_K']:.3g}"
+        return f"mean |K| {change} in the unit ball"
+    if "strain_max" in found:
+        return (
+            f"strain: mean {percent(found['strain_mean'])}, largest {percent(found['strain_max'])}"
+        )
+    if "roughness_ratio" in found:
+        return f"roughness {found['roughness_ratio']:.3g} times the input's"
+    return ""
+
+
 def summary(result: Result) -> str:
     """Summarise a solve in at most five lines, and one for each reason against it.
 
@@ -70,17 +85,7 @@ def summary(result: Result) -> str:
     '  Mesh(289 vertices, 256 faces, grid 17 x 17)'
     """
     usable = "usable" if result.usable else "not usable"
-    found = result.metrics
-    lines = [*map(str, result.reasons), headline(result)]
-    if "mean_abs_K_before" in found:
-        change = f"{found['mean_abs_K_before']:.3g} -> {found['mean_abs_K']:.3g}"
-        lines.append(f"mean |K| {change} in the unit ball")
-    elif "strain_max" in found:
-        lines.append(
-            f"strain: mean {percent(found['strain_mean'])}, largest {percent(found['strain_max'])}"
-        )
-    elif "roughness_ratio" in found:
-        lines.append(f"roughness {found['roughness_ratio']:.3g} times the input's")
+    lines = [*map(str, result.reasons), headline(result), measurement(result)]
     start = "cold start" if result.warm_start == "cold" else f"warm start: {result.warm_start}"
     seconds = f"{result.seconds.get('total', 0.0):.2g} s"
     parts = [f"{result.iterations} iterations", seconds, result.backend, start]

@@ -69,10 +69,14 @@ class Wanted:
         return any(bound is not None for bound in bounds)
 
     def met(self, surface: RuledSurface) -> bool:
-        """Return whether a measured surface is sound, not pleated, and meets the bounds."""
+        """Return whether a measured surface is sound and meets the bounds.
+
+        It must not be pleated where the number of strips is to be found.
+        """
         far, turn, radius = self.max_deviation, self.max_crease, self.min_radius
         return (
-            not surface.flaws
+            surface.sound
+            and not (surface.pleated and self.strips is None)
             and (radius is None or surface.rulings.smallest_radius >= radius)
             and (far is None or surface.farthest <= far * (1.0 + _TIGHT))
             and (turn is None or surface.creases.largest_angle <= turn)

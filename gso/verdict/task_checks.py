@@ -63,13 +63,12 @@ def developable(result: Result, limits: Limits, violation: float) -> tuple[Measu
 
 
 def strips(result: Result, limits: Limits, violation: float) -> tuple[Measured, Bounds]:
-    """Measure deviation, strain and pleats of strips, and count rulings that cross."""
+    """Measure deviation and strain of strips, and count rulings that cross."""
     surface = result.ruled
     if surface is None:
         return {}, {}
     measured, bounds = _away(result, limits, violation)
     measured[Code.RULINGS_CROSS] = Measurement(float(surface.crossed))
-    measured[Code.PLEATED] = Measurement(surface.pleat_max)
     strain = surface.strain
     if strain is None:
         strain = _strains(result.mesh, surface.pattern).max()

@@ -56,13 +56,15 @@ def page_html(
     good = certificate["usable"]
     title = listed([escape(one["name"]) for one in certificate["designs"]], 3)
     said = "can be made as it was asked for" if good else "cannot be made as it was asked for"
+    if views.shown and not parts:
+        said = "is as it was asked for" if good else "is not as it was asked for"
     data = data_for_page(views.shown, parts, certificate)
     arrays = data.pop("arrays")
     lines = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{title}: flat parts</title>",
+        f"<title>{title}{': flat parts' if parts else ''}</title>",
         f"<style>{_file('page.css')}{_colours()}</style></head><body>",
         f'<header><h1 class="{"good" if good else "bad"}">{title} {said}</h1>',
         *_reasons(certificate["reasons"]),
@@ -72,7 +74,7 @@ def page_html(
         *_section("drawings", "Drawings", _drawings(parts, views, address) if parts else []),
         *_section("sheets", "Sheets", _sheets(certificate, parts, sheets)),
         *_section("seams", "Seams", [seams_table(views, address)]),
-        *_section("places", "Places", whole_pictures(views, address)),
+        *_section("places", "Places" if parts else "Pictures", whole_pictures(views, address)),
         *_section("assembly", "Assembly", assembly_sheet(views, address)),
         *_section("designs", "Designs", [designs_table(certificate["designs"])]),
         *(f"<p>{escape(note)}</p>" for note in certificate["notes"]),

@@ -85,10 +85,10 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
         JSON-compatible but for ``arrays``: bytes with the numbers, in which the entries ``at``,
         ``count`` and ``columns`` say where an array is. ``designs`` have ``name``,
         ``mesh`` and ``motions``; ``panels`` their design, their part, ``points`` in place,
-        ``flat``, ``triangles``, edges of ``rim`` and ``bends``, and ``values`` at the points;
-        ``seams`` the two panels, lengths and ``line``; ``parts`` what the certificate says;
-        ``steps`` the order of joining; ``view`` the axes of the view from the front: right, up,
-        towards the viewer are its columns.
+        ``flat`` (it and the part are None without a pattern), ``triangles``, edges of ``rim`` and
+        ``bends``, and ``values`` at the points; ``seams`` the two panels, lengths and ``line``;
+        ``parts`` what the certificate says; ``steps`` the order of joining; ``view`` the axes of
+        the view from the front: right, up, towards the viewer are its columns.
     """
     arrays = Arrays()
     records = {one["name"]: one for one in certificate["designs"]}
@@ -99,10 +99,11 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
     colours = (255 * pale_colours(count)).round().astype(int).tolist()
     for k, one in enumerate(shown):
         first = len(out["panels"])
-        own = records[one.made.name]["parts"]
+        bare = [{"name": panel.name, "same_as": None} for panel in one.panels]
+        own = records[one.made.name].get("parts") or bare
         out["designs"].append(_design(one, arrays))
         for panel, values, entry in zip(one.panels, _values(one), own, strict=True):
-            part = number[entry["same_as"] or entry["name"]]
+            part = number.get(entry["same_as"] or entry["name"])
             out["panels"].append(
                 {
                     "name": panel.name,
@@ -114,7 +115,7 @@ def data_for_page(shown: Sequence[Shown], parts: Sequence[Part], certificate: Js
                     "values": {name: _value(arrays, x) for name, x in values.items()},
                 }
             )
-            if entry["same_as"] is None:
+            if part is not None and entry["same_as"] is None:
                 entries[part] = {k: x for k, x in entry.items() if k != "joined"}
         out["seams"] += [_seam(one, seam, k, first, arrays) for seam in one.made.matings]
         out["steps"] += [
@@ -157,7 +158,7 @@ def _panel(panel: Panel, scale: float, arrays: Arrays) -> Json:
     """Describe the shape of a panel, whose bends are in millimetres and whose surface is not."""
     return {
         "points": arrays.quantised(scale * panel.surface.vertices),
-        "flat": arrays.quantised(panel.flat),
+        "flat": arrays.quantised(panel.flat) if panel.has_pattern else None,
         "triangles": arrays.indices(panel.surface.triangles),
         "rim": arrays.indices(panel.rim),
         "bends": arrays.indices(panel.bends.reshape(-1, 2)),
@@ -181,12 +182,20 @@ def _values(one: Shown) -> list[dict[str, Array]]:
         out.append(
             {
                 "deviation": far,
-                "strain": _SHARE * _largest(surface, metrics.face_strains(surface, panel.flat)),
+                "strain": _strain(panel),
                 "curvature": metrics.worst_curvature(surface) / scale**2,
                 "bending": _largest(surface, _bending(surface)) / scale,
             }
         )
     return out
+
+
+def _strain(panel: Panel) -> Array:
+    """Return the largest strain at the vertices of a panel, in per cent; NaN without a pattern."""
+    surface = panel.surface
+    if not panel.has_pattern:
+        return np.full(len(surface.vertices), np.nan)
+    return _SHARE * _largest(surface, metrics.face_strains(surface, panel.flat))
 
 
 def _bending(surface: Mesh) -> Array:

@@ -18,7 +18,7 @@ from gso.workshop.part import Part
 def parts_table(
     certificate: Json, parts: Sequence[Part], views: Views, address: Callable[[str], str]
 ) -> str:
-    """Return the table of parts, one row for each that is drawn."""
+    """Return the table of parts, one row for each that is drawn; empty without parts."""
     heads = (
         *("part", "count", "length mm", "width mm", "area mm2", "bends", "largest angle °"),
         *("least radius mm", "holes", "seams", "joined to"),
@@ -46,7 +46,7 @@ def parts_table(
             ", ".join(_linked(name, address) for name in others) or "-",
         ]
         rows.append((f' data-part="{k}"', cells))
-    return _table(heads, rows, "parts")
+    return _table(heads, rows, "parts") if rows else ""
 
 
 def seams_table(views: Views, address: Callable[[str], str]) -> str:

@@ -36,7 +36,7 @@ class Views:
         self._at: dict[str, list[tuple[int, int]]] = {}
         for design, one in enumerate(shown):
             for k, panel in enumerate(one.made.panels):
-                self._at.setdefault(same[panel.name], []).append((design, k))
+                self._at.setdefault(same.get(panel.name, panel.name), []).append((design, k))
 
     @cached_property
     def places(self) -> list[Places]:
@@ -103,8 +103,10 @@ def whole_pictures(views: Views, address: Callable[[str], str]) -> list[str]:
     """Return the pictures of designs from both sides, with the names of their parts."""
     lines = []
     for design, places in enumerate(views.places):
-        name = escape(views.shown[design].made.name)
-        lines.append(f'<h3>{name}: the parts in their places</h3><div class="pictures">')
+        made = views.shown[design].made
+        name = escape(made.name)
+        said = ": the parts in their places" if made.panels[0].has_pattern else ""
+        lines.append(f'<h3>{name}{said}</h3><div class="pictures">')
         for side, picture in enumerate(places.pictures):
             drawn = picture.svg(address, f"view-{design}-{side}")
             lines.append(f"<figure>{drawn}<figcaption>{_SIDES[side]}</figcaption></figure>")

@@ -29,7 +29,7 @@ class Panel:
     surface : Mesh
         The panel in space, a disk or a disk with holes.
     flat : ndarray, (n, 2)
-        Its pattern, outside face up.
+        Its pattern, outside face up; not a number for a panel that is only shown, in space.
     bends : ndarray of int, (b, 2)
         Edges to bend along.
     angles, radii : ndarray, (b,)
@@ -60,6 +60,11 @@ class Panel:
             object.__setattr__(self, "zone", np.full(len(self.bends), -1))
 
     @property
+    def has_pattern(self) -> bool:
+        """Whether it has a pattern."""
+        return bool(np.isfinite(self.flat).all())
+
+    @property
     def rolled(self) -> Flags:
         """Bends that are rulings of a zone to be rolled to its radius, (b,)."""
         return self._in_zone(pressed=False)
@@ -88,7 +93,8 @@ class Panel:
     @property
     def rim(self) -> Ints:
         """Edges of the boundary loops, (e, 2)."""
-        return np.concatenate([np.stack([x, np.roll(x, -1)], axis=1) for x in self.loops])
+        none = np.empty((0, 2), np.int64)
+        return np.concatenate([none, *(np.stack([x, np.roll(x, -1)], axis=1) for x in self.loops)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,6 +91,14 @@ def of_result(name: str, result: Result, record: Json) -> Made:
     return Made(name, _named(panels, names), numbered(matings), record)
 
 
+def of_components(name: str, surface: Mesh) -> tuple[Panel, ...]:
+    """Make a panel without a pattern of each component of a surface, the largest first."""
+    parts = [part.mesh for part in largest_first(surface)]
+    nothing = [np.full((len(part.vertices), 2), np.nan) for part in parts]
+    panels = [Panel("", part, flat) for part, flat in zip(parts, nothing, strict=True)]
+    return _named(panels, [name] * len(panels))
+
+
 def surface_of(result: Result) -> Mesh:
     """Return the surface that the pattern of a result belongs to."""
     return result.design if tasks.get(result.task).flat else result.mesh

@@ -1,4 +1,7 @@
-"""Pages of results and hulls: patterns as parts, without what fabrications add."""
+"""Pages of results and hulls: patterns as parts, without what fabrications add.
+
+A result without a pattern, such as a denoised surface, is only shown in space.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,11 @@ from gso import metrics
 from gso.mesh import Mesh
 from gso.quantities import millimetres
 from gso.result import Result
+from gso.result.in_words import measurement
 from gso.seams import Segmentation
 from gso.typing import Json
 from gso.unfolding import Net
-from gso.verdict import ordered
+from gso.verdict import Reason, ordered
 from gso.workshop.certificate import design_record
 from gso.workshop.finish import Finish
 from gso.workshop.hull import HullPanel
@@ -22,7 +26,14 @@ from gso.workshop.page_data import Shown
 from gso.workshop.page_views import Views
 from gso.workshop.panels import Made
 from gso.workshop.parts import fitted, parts_from
-from gso.workshop.pattern_panels import of_net, of_pieces, of_result, of_surface, surface_of
+from gso.workshop.pattern_panels import (
+    of_components,
+    of_net,
+    of_pieces,
+    of_result,
+    of_surface,
+    surface_of,
+)
 
 
 def result_page(
@@ -32,7 +43,7 @@ def result_page(
     unit: str = "mm",
     finish: Finish = Finish(),  # noqa: B008
 ) -> str:
-    """Return the page of a result with flat patterns as HTML.
+    """Return the page of a result as HTML: its flat patterns, and its surface in space.
 
     Parameters
     ----------
@@ -49,7 +60,7 @@ def result_page(
     Raises
     ------
     MeshError
-        It has no pattern.
+        It has no pattern, but pieces that should have one.
     OptionError
         The unit is not known.
 
@@ -62,10 +73,11 @@ def result_page(
     >>> page.count('class="drawing"')
     1
     """
-    scale = millimetres(unit)
-    made, design, notes = _made(found, spelled(name))
-    reasons = [reason.scaled(scale).record("mm") for reason in ordered(made.reasons)]
-    return _page([(made, design, reasons)], notes, scale, finish)
+    scale, name = millimetres(unit), spelled(name)
+    if isinstance(found, Result) and found.pattern is None and found.pieces is None:
+        return _surface_page(found, name, scale)
+    made, design, notes = _made(found, name)
+    return _page([(made, design, _records(made.reasons, scale))], notes, scale, finish)
 
 
 def hull_page(panels: Sequence[HullPanel], allowed: float, *, unit: str = "mm") -> str:
@@ -109,6 +121,28 @@ def hull_page(panels: Sequence[HullPanel], allowed: float, *, unit: str = "mm") 
         ]
         shown.append((made, surface.mesh, reasons))
     return _page(shown, (), millimetres(unit), Finish(notches=None))
+
+
+def _surface_page(result: Result, name: str, scale: float) -> str:
+    """Return the page of a result without a pattern: its components in space."""
+    surface, known = surface_of(result), _record(result)
+    made = Made(name, of_components(name, surface), (), known)
+    reasons = _records(result.reasons, scale)
+    away = {k: scale * known[k] for k in ("deviation_mean", "deviation_max")}
+    record = {"name": name, "copies": [name], "reasons": reasons, **away}
+    certificate: Json = {
+        "usable": not reasons,
+        "reasons": reasons,
+        "notes": [measurement(result), *result.notes],
+        "designs": [record],
+        "sheets": [],
+    }
+    views = Views([Shown(made, result.design, scale, made.panels)], certificate)
+    return page_html(certificate, [], [], views)
+
+
+def _records(reasons: Sequence[Reason], scale: float) -> list[Json]:
+    return [reason.scaled(scale).record("mm") for reason in ordered(reasons)]
 
 
 def _page(

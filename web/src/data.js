@@ -28,7 +28,8 @@ export async function load() {
     design.mesh.triangles = indices(design.mesh.triangles);
   }
   for (const panel of data.panels) {
-    for (const name of ["points", "flat"]) panel[name] = numbers(panel[name]);
+    // Without a pattern there is no flat image, and no part.
+    for (const name of ["points", "flat"]) panel[name] = panel[name] && numbers(panel[name]);
     for (const name of ["triangles", "rim", "bends"]) panel[name] = indices(panel[name]);
     for (const [name, value] of Object.entries(panel.values)) {
       const count = panel.points.length / 3;

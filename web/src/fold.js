@@ -2,6 +2,32 @@
 // by a share of their angles. What the tree misses (strain, edges that are not in it) is added in
 // proportion, so that both ends are exact.
 
+// A panel without a pattern, which stays where it is.
+export class Still {
+  constructor(points, triangles) {
+    this.points = points;
+    this.triangles = triangles;
+    const count = points.length / 3;
+    const middle = [0, 0, 0];
+    for (let k = 0; k < points.length; k++) middle[k % 3] += points[k] / count;
+    let least = Infinity;
+    this.root = 0;
+    for (let f = 0; f < triangles.length / 3; f++) {
+      const at = 3 * triangles[3 * f];
+      const away = Math.hypot(...middle.map((x, i) => points[at + i] - x));
+      if (away < least) [least, this.root] = [away, f];
+    }
+  }
+
+  corners(f) {
+    return [...this.triangles.subarray(3 * f, 3 * f + 3)];
+  }
+
+  at(share, out) {
+    out.set(this.points);
+  }
+}
+
 export class Fold {
   // points (3 n), flat (2 n), triangles (3 m)
   constructor(points, flat, triangles) {

@@ -13,6 +13,8 @@ async function start() {
   const wide = document.createElement("div");
   const beside = document.createElement("aside");
   place.append(wide, beside);
+  beside.hidden = !data.parts.length;
+  place.classList.toggle("alone", beside.hidden);
 
   function choosePart(panel, scroll = false) {
     chooseNumber(panel === null ? null : data.panels[panel].part, scroll);

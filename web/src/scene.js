@@ -9,7 +9,7 @@ import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 
-import { Fold } from "./fold.js";
+import { Fold, Still } from "./fold.js";
 
 // Columns of the picture in which what is seen is looked up.
 const FINE = 320;
@@ -88,7 +88,9 @@ export class Stage {
 
   fill() {
     const { data } = this;
-    this.folds = data.panels.map((panel) => new Fold(panel.points, panel.flat, panel.triangles));
+    this.folds = data.panels.map(({ points, flat, triangles }) =>
+      flat ? new Fold(points, flat, triangles) : new Still(points, triangles),
+    );
     this.copies = this.instances();
     let points = 0;
     let corners = 0;

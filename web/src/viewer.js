@@ -112,6 +112,8 @@ export class Viewer {
         this.range();
         this.colour();
       });
+    if (!this.data.panels.some((panel) => panel.flat)) own.fold.closest("label").hidden = true;
+    if (!this.data.panels.some((panel) => panel.angles.length)) own.bends.closest("label").hidden = true;
     if (!this.data.seams.length) own.seams.closest("label").hidden = true;
     own.names.addEventListener("change", () => this.settle());
     own.seams.addEventListener("change", () => this.settle());
@@ -182,7 +184,7 @@ export class Viewer {
     const accent = rgb(style.getPropertyValue("--accent"));
     stage.colour((panel, v, out) => {
       const own = data.panels[panel];
-      if (own.part !== this.chosen) return own.colour;
+      if (this.chosen === null || own.part !== this.chosen) return own.colour;
       for (let k = 0; k < 3; k++) out[k] = 0.35 * own.colour[k] + 0.65 * accent[k];
       return out;
     });
@@ -267,6 +269,7 @@ export class Viewer {
 
   // The bend line that is the nearest in the pattern, if it is near on the screen.
   bendNear(panel, { corners, shares, far }) {
+    if (!panel.angles.length) return null;
     const q = panel.flat;
     const [x, y] = [0, 1].map((i) => corners.reduce((sum, v, k) => sum + shares[k] * q[2 * v + i], 0));
     const pixel = (2 * far * Math.tan((this.stage.camera.fov * Math.PI) / 360)) / this.space.clientHeight;
@@ -293,7 +296,7 @@ export class Viewer {
       else if (event.key === "+" || event.key === "=") this.stage.zoom(0.88);
       else if (event.key === "-") this.stage.zoom(1 / 0.88);
       else if (event.key === "Escape") this.choose(null);
-      else if (event.key === "n" || event.key === "p") {
+      else if ((event.key === "n" || event.key === "p") && data.parts.length) {
         const way = event.key === "n" ? 1 : -1;
         const next = this.chosen === null ? 0 : (this.chosen + way + data.parts.length) % data.parts.length;
         this.choose(data.parts[next].panels[0] ?? null);

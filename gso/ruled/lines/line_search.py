@@ -34,18 +34,19 @@ _ALIKE = 1.25
 _GOOD = 0.5
 #: Share of the predicted distance up to which the mesh's own rulings give planar enough polygons.
 _PLANAR = 0.2
-#: Fairness of creases where strips are far away otherwise.
-_NEARER = 0.05
+#: Fairness of creases where strips are far away otherwise, and where they are just too far.
+_NEARER, _LESS = 0.05, 0.2
 #: Fairness of creases where strips are pleated otherwise.
 _EVEN, _EVENER = 2.0, 10.0
 #: Whether to take the other kind of rulings, and fairness, one after the other until strips have
-#: no flaws and are near; half of them for the second family. The other lists are for strips that
-#: fold, and for those that are pleated.
+#: no flaws and are near; half of them for the second family. The lists are for strips that are too
+#: far away, just beyond the largest allowed distance, folded, and pleated.
 _FIRST = (False, FAIR)
 _IF_FAR = ((False, _NEARER), (True, FAIR), (True, _NEARER))
+_IF_BEYOND = ((False, _LESS), (False, _NEARER), (True, FAIR), (True, _NEARER))
 _IF_FOLDED = ((True, FAIR), (False, _NEARER), (True, _NEARER))
 _IF_PLEATED = ((False, _EVEN), (True, _EVEN), (False, _EVENER))
-_SETTINGS = 1 + len(_IF_FAR)
+_SETTINGS = 1 + len(_IF_BEYOND)
 #: Ratio to the largest allowed distance up to which less fair creases may hold it.
 _CLOSE = 1.3
 #: Ratio to the distance that is predicted for half as many strips from which others are tried.
@@ -203,7 +204,11 @@ class LineStrips:
         for place, (choice, lines) in enumerate(_candidates(count, choices)):
             least = min(least, choice.rank(count))
             alike = choice.rank(count) <= _ALIKE * least
-            if not alike and any(not one.surface.flaws and one.mean <= good for one in tried):
+            done = (
+                not one.surface.flaws and one.mean <= good and not _just_beyond(one, aim)
+                for one in tried
+            )
+            if not alike and any(done):
                 break
             tried += self._settled(choice, lines, limit, _SETTINGS >> place, aim)
             good = _GOOD * choice.rank(count)
@@ -225,19 +230,22 @@ class LineStrips:
         tried: list[Found] = []
         settings = [_FIRST]
         for turn in range(most):
+            if turn == len(settings):
+                break
             found = self._solved(choice, lines, *settings[turn])
             if self.stopped:
                 break
             flaws = 2 if found is None else found.surface.flaws
+            beyond = found is not None and _just_beyond(found, aim)
             if turn == 0:
-                settings += (_IF_FAR, _IF_PLEATED, _IF_FOLDED)[flaws]
+                near = _IF_BEYOND if beyond else _IF_FAR
+                settings += (near, _IF_PLEATED, _IF_FOLDED)[flaws]
             if found is None:
                 continue
             tried.append(found)
             far = found.surface.farthest
-            enough = far <= limit and not aim < far <= _CLOSE * aim
             hopeless = flaws == 1 and far > _CLOSE * aim
-            if hopeless or (not flaws and (turn > 0 or enough)):
+            if hopeless or (not flaws and not beyond and (turn > 0 or far <= limit)):
                 break
         return tried
 
@@ -361,6 +369,11 @@ def _candidates(count: int, choices: Sequence[Choice]) -> list[tuple[Choice, Int
 def _distance(found: Found) -> tuple[int, float]:
     """Sort key: surfaces with fewer flaws first, then by the largest distance."""
     return found.surface.flaws, found.surface.farthest
+
+
+def _just_beyond(found: Found, aim: float) -> bool:
+    """Return whether strips are so little beyond a distance that others may hold it."""
+    return bool(aim < found.surface.farthest <= _CLOSE * aim)
 
 
 def _gaps(polygons: Polygons, points: Array) -> float:

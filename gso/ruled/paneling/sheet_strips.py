@@ -31,15 +31,22 @@ def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
 
 
 def against_parts(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
-    """Return the reasons if parts do not fit the sheet, or do not hold the budgets of pieces."""
+    """Return the reasons if parts do not fit the sheet, are pleated, or miss budgets of pieces."""
     pattern = result.pattern
-    reasons = against_sheet(result, request)
+    reasons = (*against_sheet(result, request), *_against_pleats(result, request))
     if pattern is None:
         return reasons
     parts = split(pattern.surface(result.mesh))
     sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in parts]
     pieces = 1 if result.pieces is None else len(result.pieces)
     return (*reasons, *request.seams.reasons(pieces, sheets))
+
+
+def _against_pleats(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
+    """Return the reason if strips are pleated; none where their number was named."""
+    if not isinstance(result, StripsResult) or not request.is_counted:
+        return ()
+    return compare({Code.PLEATED: result.ruled.pleat_max}, {})
 
 
 def _too_large(parts: Sequence[Array], sheet: tuple[float, float]) -> tuple[Reason, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from gso.result import Result, StripsResult
 from gso.ruled.strip_metrics import smallest_part
 from gso.typing import Array
+from gso.verdict import Code
 from gso.wording import length
 
 #: Angle of a fold and of a crease, in degrees, that a note is made of.
@@ -38,15 +39,23 @@ _ADVICE = Advice()
 
 
 def shop_notes(result: Result) -> tuple[str, ...]:
-    """Return notes on sharp folds and creases, tight bends and small parts of strips.
+    """Return notes on pleats, sharp folds and creases, tight bends and small parts of strips.
 
     Nothing for designs that are kept as they are: their folds, bends and parts are meant.
     """
     if not isinstance(result, StripsResult) or result.ruled.strain is not None:
         return ()
+    pleated = result.ruled.pleated and Code.PLEATED not in {why.code for why in result.reasons}
     rulings, steep = result.ruled.rulings, float(np.degrees(result.ruled.creases.largest_angle))
     small = smallest_part(result.ruled.pattern)
-    return said(rulings.angles, rulings.radii, result.design.size, steep, small)
+    notes = said(rulings.angles, rulings.radii, result.design.size, steep, small)
+    if not pleated:
+        return notes
+    return (
+        f"strips are pleated: their bends go up and down in turn by {result.ruled.pleat_max:.0f} "
+        "degrees where the design does not; more strips lower that",
+        *notes,
+    )
 
 
 def said(

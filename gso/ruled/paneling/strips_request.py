@@ -79,6 +79,13 @@ class StripsRequest:
         return self.limits.max_deviation
 
     @property
+    def is_counted(self) -> bool:
+        """Whether as few strips are looked for as hold a bound."""
+        options = self.options
+        bounded = self.max_deviation is not None or options.max_crease is not None
+        return bounded and options.number is None
+
+    @property
     def max_strain(self) -> float:
         """Largest strain of pieces that no strips follow, which keep their joint pattern."""
         given = self.limits.max_strain
