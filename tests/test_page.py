@@ -37,7 +37,6 @@ from gso.workshop import (
     sheet_drawing,
     step_pictures,
 )
-from gso.workshop.result_page import result_page
 from tests.browser import PROGRAM, Browser
 from tests.page_designs import html_of, job_of, vault
 
@@ -331,10 +330,13 @@ def test_a_result_without_a_pattern_is_shown_in_space(parts, tmp_path):
         assert isinstance(panel["values"]["deviation"], dict)
 
 
-def test_closed_surfaces_have_a_page():
+def test_closed_surfaces_have_a_page(tmp_path):
+    file, out = tmp_path / "ball.npz", tmp_path / "ball.html"
     ball = trimesh.creation.icosphere(1)
-    text = result_page(gso.tno.optimize(gso.as_mesh(ball), task="denoise"), "ball")
-    (panel,) = json.loads(read(text, "page-data"))["panels"]
+    gso.tno.optimize(gso.as_mesh(ball), task="denoise").save(file)
+    done = CliRunner().invoke(main, ["view", str(file), "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    (panel,) = json.loads(read(out.read_text(), "page-data"))["panels"]
     assert panel["rim"]["count"] == 0 and panel["flat"] is None
 
 

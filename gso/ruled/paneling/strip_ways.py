@@ -286,7 +286,7 @@ class StripsTask:
         return lines_of(design, asked)
 
     def _twisted(self, tried: Sequence[Tried]) -> bool:
-        """Return whether there are several strips where lines promised far fewer."""
+        """Return whether strips are many, as the rulings across the lines of the design twist."""
         if self._lines is None or not self._counted:
             return False
         best = min(tried, key=lambda one: one.order(few=True))
