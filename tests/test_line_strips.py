@@ -456,15 +456,15 @@ def test_rounded_coordinates_of_a_straight_outline_change_nothing(digits):
 
 
 @pytest.mark.parametrize(
-    ("make", "bound"),
+    ("make", "bound", "count"),
     [
-        (awning, 0.03),
-        pytest.param(wave, 0.01, marks=pytest.mark.slow),
-        pytest.param(canopy, 0.01, marks=pytest.mark.slow),
+        (awning, 0.03, 3),
+        pytest.param(wave, 0.01, 2, marks=pytest.mark.slow),
+        pytest.param(canopy, 0.01, 3, marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.parametrize("way", ["transposed", "flipped", "both", "turned in space"])
-def test_the_number_of_strips_does_not_depend_on_the_way_round_of_a_grid(make, bound, way):
+def test_the_number_of_strips_does_not_depend_on_the_way_round_of_a_grid(make, bound, count, way):
     points = sampled(make).round(6)
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ [[1, 0, 0], [0, c, -s], [0, s, c]]
@@ -475,7 +475,7 @@ def test_the_number_of_strips_does_not_depend_on_the_way_round_of_a_grid(make, b
         "turned in space": points @ turn.T,
     }[way]
     results = [gso.strips(np.ascontiguousarray(p), max_deviation=bound) for p in (points, other)]
-    assert [result.ruled.strips for result in results] == [3, 3]
+    assert [result.ruled.strips for result in results] == [count, count]
     assert all(result.usable for result in results)
     far = [result.ruled.farthest for result in results]
     assert far[1] == pytest.approx(far[0], rel=0.1)
