@@ -76,10 +76,10 @@ def _on_disk(file: str) -> str:
     """
     from gso.io import check_unit
 
-    context = click.get_current_context(silent=True)
-    if file != STANDARD or context is None:
-        check_unit(file, "mm" if context is None else context.params.get("unit", "mm"))
+    if file != STANDARD:
+        check_unit(file, _unit())
         return file
+    context = click.get_current_context()
     if _STDIN not in context.meta:
         data = sys.stdin.buffer.read()
         if not data:
@@ -120,6 +120,11 @@ def source(file: str, weld: float | None) -> str | Unwelded:
 
     chord, file = _chord(), _on_disk(file)
     return file if weld is None and chord is None else Unwelded(file, weld, chord)
+
+
+def _unit() -> str:
+    context = click.get_current_context(silent=True)
+    return "mm" if context is None else context.params.get("unit", "mm")
 
 
 def _chord() -> float | None:

@@ -104,7 +104,7 @@ class Job:
         """The task, by name."""
         return str(self.keywords["task"])
 
-    def check(self, out: str, plot: str | None = None, page: str | None = None) -> None:
+    def check(self, out: str, plot: str | None = None) -> None:
         """Raise an error if an output cannot be written, before anything is computed."""
         from gso import io
 

@@ -48,7 +48,7 @@ def _single(
     from gso.io.json_file import write_json
     from gso.solver import loops
 
-    job.check(path, plot, page)
+    job.check(path, plot)
     job.spare([file], path, plot, page, table)
     mesh = file_options.load(file, job.weld)
     if path.lower().endswith(".npy") and mesh.grid_shape is None:

@@ -25,9 +25,8 @@ def view(file: str, out: str, unit: str, force: bool, quiet: bool) -> None:
     """Show the result FILE, .npz of gso optimize or gso strips, as a page for a browser.
 
     The page turns, folds and explodes the patterns, and works without a network. A surface without
-    a pattern, as of --task denoise, turns, and has heat maps. gso optimize,
-    gso strips, gso unfold and gso loft write it with --page, gso pieces and gso fabricate in their
-    folders.
+    a pattern, as of --task denoise, turns, and has heat maps. gso optimize, gso strips, gso unfold
+    and gso loft write it with --page, gso pieces and gso fabricate in their folders.
     """
     from gso import io
     from gso.result import Result

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.geometry.vectors import cross, lengths, unit
+from gso.geometry.vectors import cross, fold_angles, lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.mesh.topology import four_corners, label_components, pair_keys
 from gso.ruled.fold_lines import Folds
@@ -60,8 +60,8 @@ def pleats(mesh: Mesh, strip: Ints, rulings: Folds, creases: Folds, design: Mesh
     own = unit(cross(b - a, c - a))
     p, q = planar[one[bent]], planar[two[bent]]
     way = unit(mesh.vertices[ends[bent, 1]] - mesh.vertices[ends[bent, 0]])
-    turn = _turn(normal[p], normal[q], way)
-    excess = turn - _turn(own[p], own[q], way)
+    turn = fold_angles(normal[p], normal[q], way)
+    excess = turn - fold_angles(_across(own[p], way), _across(own[q], way), way)
     size = np.where(turn * excess > 0.0, np.minimum(np.abs(turn), np.abs(excess)), 0.0)
     # Faces that meet at a small angle are one.
     small = np.abs(angle) < _SMALL
@@ -86,9 +86,6 @@ def _planes(mesh: Mesh, planar: Ints) -> tuple[Array, Array]:
     return unit(normal), middle / total[:, None]
 
 
-def _turn(one: Array, two: Array, way: Array) -> Array:
-    """Return the angles (k,) from unit vectors to others, seen along unit vectors."""
-    along = [np.einsum("kd,kd->k", normal, way)[:, None] * way for normal in (one, two)]
-    one, two = one - along[0], two - along[1]
-    sine = np.einsum("kd,kd->k", cross(one, two), way)
-    return np.asarray(np.arctan2(sine, np.einsum("kd,kd->k", one, two)))
+def _across(vectors: Array, way: Array) -> Array:
+    """Return vectors (k, 3) without their part along unit vectors."""
+    return np.asarray(vectors - np.einsum("kd,kd->k", vectors, way)[:, None] * way)

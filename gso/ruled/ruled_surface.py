@@ -108,7 +108,7 @@ class RuledSurface:
     @property
     def flaws(self) -> int:
         """2 for a surface that is not sound, 1 for one that is pleated, else 0."""
-        return 1 if self.sound and self.pleated else 2 * (not self.sound)
+        return int(self.pleated) if self.sound else 2
 
     @property
     def strains(self) -> dict[str, float]:

@@ -127,16 +127,9 @@ def _surface_page(result: Result, name: str, scale: float) -> str:
     """Return the page of a result without a pattern: its components in space."""
     surface, known = surface_of(result), _record(result)
     made = Made(name, of_components(name, surface), (), known)
-    reasons = _records(result.reasons, scale)
-    away = {k: scale * known[k] for k in ("deviation_mean", "deviation_max")}
-    record = {"name": name, "copies": [name], "reasons": reasons, **away}
-    certificate: Json = {
-        "usable": not reasons,
-        "reasons": reasons,
-        "notes": [measurement(result), *result.notes],
-        "designs": [record],
-        "sheets": [],
-    }
+    record: Json = {"name": name, "copies": [name], "reasons": _records(result.reasons, scale)}
+    record |= {k: scale * known[k] for k in ("deviation_mean", "deviation_max")}
+    certificate = _certificate([record], [measurement(result), *result.notes])
     views = Views([Shown(made, result.design, scale, made.panels)], certificate)
     return page_html(certificate, [], [], views)
 
@@ -162,15 +155,20 @@ def _page(
         records.append(record)
         parts += own
         views.append(Shown(made, design, scale, fit.panels))
+    certificate = _certificate(records, notes)
+    return page_html(certificate, parts, [], Views(views, certificate))
+
+
+def _certificate(records: list[Json], notes: Sequence[str]) -> Json:
+    """Return what a page says of designs as a whole, from the records of each."""
     against = [reason for record in records for reason in record["reasons"]]
-    certificate: Json = {
+    return {
         "usable": not against,
         "reasons": against,
         "notes": list(notes),
         "designs": records,
         "sheets": [],
     }
-    return page_html(certificate, parts, [], Views(views, certificate))
 
 
 def _made(found: Result | Segmentation | Net, name: str) -> tuple[Made, Mesh, tuple[str, ...]]:
