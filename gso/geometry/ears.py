@@ -98,7 +98,7 @@ def ears(polygon: Array, *, simple: bool = True) -> Ints:
         a, b, c = np.roll(ring, 1), ring, np.roll(ring, -1)
         area = _cross(z[b] - z[a], z[c] - z[a])
         sides = np.maximum.reduce([abs(z[b] - z[a]), abs(z[c] - z[b]), abs(z[a] - z[c])])
-        thin = area / np.maximum(sides, 1e-300) ** 2
+        thin = area / np.maximum(sides, 1e-150) ** 2
         best = np.argsort(-thin, kind="stable")
         best = best[area[best] > least].tolist()
         # Points on the sides of an ear are in the way only if there is another one.

@@ -89,7 +89,7 @@ class Polylines:
     def nearest(self, points: Array) -> Feet:
         """Find the points of the polylines nearest to points (k, dim)."""
         edge = self.end - self.start
-        square = (edge**2).sum(axis=1)
+        square = np.maximum((edge**2).sum(axis=1), 1e-300)  # points may coincide
         segment = np.empty(len(points), np.int64)
         along = np.empty(len(points))
         block = max(_BLOCK // len(edge), 1)

@@ -250,7 +250,8 @@ def _bending(mesh: Mesh) -> Array:
     v, he = mesh.vertices, mesh.half_edges
     triples = topology.polyline_triples(he, mesh.faces)
     a, b, c = v[triples].transpose(1, 0, 2)
-    bend = lengths(unit(c - b) - unit(b - a)) / (0.5 * (lengths(c - b) + lengths(b - a)))
+    long = np.maximum(0.5 * (lengths(c - b) + lengths(b - a)), 1e-300)
+    bend = lengths(unit(c - b) - unit(b - a)) / long
     size = len(mesh.edges)
     total, count = np.zeros(size), np.zeros(size)
     for k in range(2):

@@ -209,7 +209,7 @@ class LineFitter:
                 continue
             a, b, c = start[triples].transpose(1, 0, 2)
             before, after = lengths(b - a), lengths(c - b)
-            ahead = before / (before + after)
+            ahead = before / np.maximum(before + after, 1e-300)
             factors = np.stack([ahead - 1.0, np.ones(len(ahead)), -ahead])
             target = sum(f[:, None] * v for f, v in zip(factors, (a, b, c), strict=True))
             term = Term(
