@@ -147,7 +147,9 @@ class LineStrips:
         best = min(known, key=lambda k: _distance(self.results[k]), default=None)
         return None if best is None else self._certain(best)
 
-    def narrow(self, number: int, widest: float, aim: float) -> Found | None:
+    def narrow(
+        self, number: int, widest: float, aim: float, most: int | None = None
+    ) -> Found | None:
         """Return as few strips along a family of lines as are narrow enough, and near by forecast.
 
         Parameters
@@ -158,6 +160,8 @@ class LineStrips:
             Largest width of a strip.
         aim : float
             Largest distance that is predicted.
+        most : int, optional
+            Largest number of strips.
 
         Returns
         -------
@@ -166,8 +170,8 @@ class LineStrips:
             ended.
         """
         choice = self.choices[number].narrower(widest)
-        most = 0 if self.stopped else choice.rows
-        every = (choice.lines(count) for count in range(1, most + 1))
+        rows = choice.rows if most is None else min(most, choice.rows)
+        every = (choice.lines(count) for count in range(1, 1 if self.stopped else rows + 1))
         lines = next((found[0] for found in every if found is not None and found[1] <= aim), None)
         tried = [] if lines is None else self._settled(choice, lines, np.inf)
         best = min(tried, key=lambda found: found.order, default=None)

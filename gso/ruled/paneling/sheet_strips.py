@@ -18,6 +18,8 @@ from gso.status import Status
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare
 
+Narrow = Callable[[float, int | None], Result | None]
+
 #: Share of the sheet that strips may be wide.
 _ROOM = 0.97
 
@@ -85,9 +87,7 @@ def divided(result: Result, request: StripsRequest) -> Result:
     return made
 
 
-def on_sheets(
-    result: Result, request: StripsRequest, ways: Sequence[Callable[[float], Result | None]]
-) -> Result:
+def on_sheets(result: Result, request: StripsRequest, ways: Sequence[Narrow]) -> Result:
     """Divide strips that are larger than the sheet, and take more where rulings are too long.
 
     Parameters
@@ -95,33 +95,44 @@ def on_sheets(
     result : Result
     request : StripsRequest
     ways : sequence of callable
-        Each solves for strips of a largest width, in its own way.
+        Each solves for strips of a largest width, in its own way. It may return None where these
+        would be more than a number, if one is given.
 
     Returns
     -------
     Result
         That with the smallest number of parts among those whose parts fit and that are near
-        enough, or else that with the fewest parts.
+        enough, or else that with the fewest parts. Of as many parts, the nearest.
     """
     sheet = request.sheet
     large = result.ruled is not None and len(against_sheet(result, request)) > 0
     if sheet is None or not large or result.status is Status.CANCELLED:
         return result
-    tried = [divided(result, request)]
+    first = divided(result, request)
+    best, order = first, _order(first, request)
     # A number that was named stays, and without a distance there is one strip.
     free = request.options.number is None and request.max_deviation is not None
     for widest in sorted(sheet, reverse=True) if free else ():
         for way in ways:
-            other = way(_ROOM * widest)
-            if other is not None and other.status is Status.CANCELLED:
-                return replace(tried[0], status=Status.CANCELLED)
-            if other is not None:
-                tried.append(divided(other, request))
+            unfit, failed, parts, _ = order
+            # A strip is one part or more.
+            other = way(_ROOM * widest, None if unfit or failed else parts)
+            if other is None:
+                continue
+            if other.status is Status.CANCELLED:
+                return replace(first, status=Status.CANCELLED)
+            other = divided(other, request)
+            own = _order(other, request)
+            if own < order:
+                best, order = other, own
+    return best
 
-    def order(one: Result) -> tuple[bool, bool, int]:
-        return len(against_sheet(one, request)) > 0, one.status.is_failure, _parts(one)
 
-    return min(tried, key=order)
+def _order(result: Result, request: StripsRequest) -> tuple[bool, bool, int, float]:
+    """Sort key: parts that fit the sheet first, then no failure, few parts, and near strips."""
+    unfit, surface = len(against_sheet(result, request)) > 0, result.ruled
+    far = np.inf if surface is None else surface.farthest
+    return unfit, result.status.is_failure, _parts(result), far
 
 
 def longest_ruling(result: Result) -> float:

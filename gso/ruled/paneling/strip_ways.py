@@ -258,13 +258,15 @@ class StripsTask:
         result = made(asked.options)
         count, longest = result.details.get("strips", 0), longest_ruling(result)
 
-        def narrow(widest: float) -> Result | None:
+        def narrow(widest: float, most: int | None) -> Result | None:
             more = max(int(np.ceil(count * longest / widest)), count + 1)
-            if more > asked.options.max_strips:
+            # Strips with flat regions between them may be one part.
+            few = asked.options.max_strips if most is None or asked.options.flats else most
+            if more > min(few, asked.options.max_strips):
                 return None
             return made(replace(asked.options, strips=more))
 
-        result = on_sheets(result, asked, [narrow])
+        undivided, result = result, on_sheets(result, asked, [narrow])
         clock = time.perf_counter()
         reasons: tuple[Reason, ...] = ()
         if asked.verdict or self.divisible:
@@ -272,7 +274,7 @@ class StripsTask:
             own = judge(result, asked.limits, violation)
             reasons = ordered([*own, *against_parts(result, asked)])
         result.seconds["verdict"] = time.perf_counter() - clock
-        return [Tried(result, reasons)]
+        return [Tried(result, reasons, undivided)]
 
     @cached_property
     def _lines(self) -> LineStrips | None:
@@ -289,9 +291,10 @@ class StripsTask:
         """Return whether strips are many, as the rulings across the lines of the design twist."""
         if self._lines is None or not self._counted:
             return False
-        best = min(tried, key=lambda one: one.order(few=True))
-        far = _TWISTED * self._lines.predicted(best.strips) * self.design.diagonal
-        return best.strips >= _SEVERAL and best.far > far
+        best = min(tried, key=lambda one: one.order(few=True)).wide.ruled
+        if best is None or best.strips < _SEVERAL:
+            return False
+        return best.farthest > _TWISTED * self._lines.predicted(best.strips) * self.design.diagonal
 
     @property
     def _least(self) -> int:
@@ -323,8 +326,8 @@ class StripsTask:
     def _of_lines(self, lines: LineStrips, most: int | None) -> list[Tried]:
         asked = self.request
 
-        def narrow(family: int, widest: float) -> Result | None:
-            return along_lines(self.design, asked, lines, narrow=(family, widest))
+        def narrow(family: int, widest: float, most: int | None) -> Result | None:
+            return along_lines(self.design, asked, lines, most=most, narrow=(family, widest))
 
         result = along_lines(self.design, asked, lines, most=most)
         if result is None:
@@ -333,9 +336,10 @@ class StripsTask:
             # Grids are mostly finer than the design: strips can be nearly as wide as sheets.
             lines.add_copies()
         families = range(len(lines.choices))
+        undivided = result
         result = on_sheets(result, asked, [partial(narrow, k) for k in families])
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
-        return [Tried(result, ordered([*own, *against_parts(result, asked)]))]
+        return [Tried(result, ordered([*own, *against_parts(result, asked)]), undivided)]
 
     def _judged_pieces(self, result: Result, reasons: tuple[Reason, ...]) -> Tried:
         """Divide strips of pieces for the sheet, and judge them."""

@@ -244,7 +244,7 @@ def along_lines(
     aim = wanted(options, request.max_deviation, design.diagonal)
     if narrow is not None:
         far = np.inf if aim.max_deviation is None else aim.max_deviation
-        found = lines.narrow(narrow[0], narrow[1] / design.diagonal, far)
+        found = lines.narrow(narrow[0], narrow[1] / design.diagonal, far, most)
     elif most == 0:
         found = lines.as_it_is(aim)
     elif options.flats or (aim.strips == 1 and lines.predicted(1) > EXACT):

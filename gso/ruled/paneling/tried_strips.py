@@ -16,10 +16,16 @@ _CLOSE = 1e-4
 
 @dataclass(frozen=True)
 class Tried:
-    """A result, and the reasons against it."""
+    """A result, the reasons against it, and what it was before it was divided for a sheet."""
 
     result: Result
     reasons: tuple[Reason, ...]
+    undivided: Result | None = None
+
+    @property
+    def wide(self) -> Result:
+        """The strips before they were made narrower and divided for the sheet."""
+        return self.result if self.undivided is None else self.undivided
 
     @property
     def ended(self) -> bool:
