@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 import gso
 from gso.mesh import Mesh
-from gso.ruled.lines import LineStrips, families
+from gso.ruled.lines import LineStrips, families, grid_copies
 from gso.ruled.solve import Wanted
 
 
@@ -373,6 +375,16 @@ def test_outlines_that_have_no_corners_or_many():
     assert gso.strips(stairs(), strips=8).metrics["distance_max"] < 1.0
 
 
+def test_grids_laid_over_corners_have_no_points_that_coincide():
+    # Both edges of a triangle at a corner may lie on one side of a grid.
+    for mesh in (scaled(gso.as_mesh(dome(11))), scaled(stairs(15))):
+        copies = grid_copies(mesh)
+        assert copies
+        for copy in copies:
+            ends = copy.vertices[copy.edges]
+            assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() > 1e-6
+
+
 def test_metrics_of_parts_with_slits():
     tube = gso.as_mesh(sheet("cylinder", count=13))
     row = tube.grid_index[6, :5]
@@ -445,6 +457,12 @@ def sampled(make, rows=17, columns=13):
     return np.stack(np.broadcast_arrays(*make(u, v)), axis=-1)
 
 
+@cache
+def strips_within(make, bound):
+    """Strips of a sampled surface, shared by tests that read them."""
+    return gso.strips(sampled(make).round(6), max_deviation=bound)
+
+
 @pytest.mark.parametrize("digits", [6, 9])
 def test_rounded_coordinates_of_a_straight_outline_change_nothing(digits):
     exact = sampled(awning, 31, 23)
@@ -466,6 +484,7 @@ def test_rounded_coordinates_of_a_straight_outline_change_nothing(digits):
 @pytest.mark.parametrize("way", ["transposed", "flipped", "both", "turned in space"])
 def test_the_number_of_strips_does_not_depend_on_the_way_round_of_a_grid(make, bound, count, way):
     points = sampled(make).round(6)
+    wanted = strips_within(make, bound)
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ [[1, 0, 0], [0, c, -s], [0, s, c]]
     other = {
@@ -474,7 +493,7 @@ def test_the_number_of_strips_does_not_depend_on_the_way_round_of_a_grid(make, b
         "both": points[:, ::-1].transpose(1, 0, 2),
         "turned in space": points @ turn.T,
     }[way]
-    results = [gso.strips(np.ascontiguousarray(p), max_deviation=bound) for p in (points, other)]
+    results = [wanted, gso.strips(np.ascontiguousarray(other), max_deviation=bound)]
     assert [result.ruled.strips for result in results] == [count, count]
     assert all(result.usable for result in results)
     far = [result.ruled.farthest for result in results]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,6 +48,13 @@ def cone(n: int = 65, turn: float = np.pi / 2) -> Mesh:
 
 
 SQUARE = Part("square", np.array([[0.0, 0], [100, 0], [100, 50], [0, 50]]))
+
+
+@cache
+def domed(height: float, far: str = "1%"):
+    """A dome that was made within a distance, shared by tests that read it."""
+    design = Design("dome", dome(17, height=height))
+    return made(design, FabricationSettings(max_deviation=far))
 
 
 def parts_of(whole, scale, finish, marks=(), holes=()):
@@ -276,10 +284,7 @@ class TestParts:
         assert all(bend.angle < 0 for bend in part.bends if abs(bend.angle) > np.radians(2))
 
     def test_notches_of_strips_are_at_the_same_places_of_both_sides(self):
-        design = dome(17, height=0.6)
-        whole = made(
-            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
-        )
+        whole = domed(0.6, "3%")
         assert len(whole.panels) > 1
         parts = parts_of(whole, 100.0, Finish(notches=20.0))
         strips = [s for s in whole.matings if s.mismatch(whole.panels) < 1e-9]
@@ -294,14 +299,16 @@ class TestParts:
             assert len(one) % 2 == 1
             # Straight distances are equal as the pieces of outline between are congruent only
             # where the seam is straight; arc lengths are equal anyway.
-            assert seam.mismatch(whole.panels) * 100.0 < 1e-6 * 100.0 * design.diagonal
+            assert (
+                seam.mismatch(whole.panels) * 100.0 < 1e-6 * 100.0 * dome(17, height=0.6).diagonal
+            )
             assert len(step[0]) == len(step[1])
 
     @pytest.mark.slow
     def test_notches_of_pieces_are_at_equal_arc_lengths(self):
         design = dome(9, height=1.0)
         whole = made(
-            Design("dome", design), FabricationSettings(max_deviation=0.01 * design.diagonal)
+            Design("dome", design), FabricationSettings(max_deviation=0.02 * design.diagonal)
         )
         assert any(whole.record["strips"]) and not all(seam.common for seam in whole.matings)
         parts = parts_of(whole, 1000.0, Finish(notches=100.0, labels=None))
@@ -321,10 +328,7 @@ class TestParts:
             assert seam.mismatch(whole.panels) <= most
 
     def test_notches_point_into_the_part(self):
-        design = dome(17, height=0.6)
-        whole = made(
-            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
-        )
+        whole = domed(0.6, "3%")
         for part in parts_of(whole, 100.0, Finish(notches=30.0, labels=None)):
             shape = shapely.Polygon(part.outline)
             assert part.notches
@@ -333,10 +337,7 @@ class TestParts:
                 assert shape.contains(shapely.Point(notch.at + 0.05 * notch.inward))
 
     def test_tabs_lie_outside_and_do_not_overlap(self):
-        design = dome(17, height=0.6)
-        whole = made(
-            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
-        )
+        whole = domed(0.6, "3%")
         plain = parts_of(whole, 100.0, Finish(notches=None, labels=None))
         tabbed = parts_of(whole, 100.0, Finish(notches=None, labels=None, tabs=5.0))
         assert sum(len(part.creases) for part in tabbed) > 0
@@ -345,10 +346,7 @@ class TestParts:
             assert shapely.Polygon(after.outline).is_valid
 
     def test_registration_holes_are_inside(self):
-        design = dome(17, height=0.6)
-        whole = made(
-            Design("dome", design), FabricationSettings(max_deviation=0.03 * design.diagonal)
-        )
+        whole = domed(0.6, "3%")
         parts = parts_of(whole, 100.0, Finish(notches=30.0, registration=(1.0, 2.0)))
         assert any(part.holes for part in parts)
         for part in parts:
@@ -402,7 +400,7 @@ class TestMaking:
 
 class TestMarks:
     def test_marks_in_a_triangle_keep_their_part_and_length(self):
-        whole = made(Design("dome", dome(17, height=0.6)), FabricationSettings())
+        whole = domed(0.6)
         rng = np.random.default_rng(0)
         lines = []
         for panel in whole.panels:

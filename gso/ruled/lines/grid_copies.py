@@ -169,8 +169,16 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
     image = parametrization.inside(mesh, loop, rim)
     rows, columns = _counts(wide, high, len(mesh.triangles))
 
+    def outline(number: int, share: Array) -> Array:
+        at = along[start[number]] + share * side[number]
+        return np.stack([np.interp(at, along, ring[:, k]) for k in range(3)], axis=1)
+
     def placed(one: Array, two: Array) -> Array:
-        return _placed(mesh.vertices, mesh.triangles, image, one, two)
+        points = _placed(mesh.vertices, mesh.triangles, image, one, two)
+        # Triangles with two edges on one side of the box have no area in the image.
+        points[:, 0], points[-1] = outline(0, one / wide), outline(1, two / high)
+        points[:, -1], points[0] = outline(2, 1.0 - one / wide), outline(3, 1.0 - two / high)
+        return points
 
     even = [np.linspace(0.0, x, _FINE) for x in (wide, high)]
     fine = placed(*even)

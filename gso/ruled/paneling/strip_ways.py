@@ -168,6 +168,15 @@ class StripsTask:
         number = self.request.options.number
         return number is not None and number >= _MANY
 
+    def _is_enough(self, one: Tried) -> bool:
+        """Whether strips need not be compared with those of the design as a whole.
+
+        Many along lines are far nearer, unless they are fewer than asked for: more were no nearer.
+        """
+        number = self.request.options.number
+        many = number is not None and number >= _MANY and one.strips >= number
+        return one.is_close or (many and one.holds)
+
     @property
     def _counted(self) -> bool:
         """Whether as few strips are looked for as hold a distance."""
@@ -241,8 +250,7 @@ class StripsTask:
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request
-        enough = any(one.is_close or (self._many and one.holds) for one in tried)
-        if enough or not _is_whole(light.mesh):
+        if any(self._is_enough(one) for one in tried) or not _is_whole(light.mesh):
             return []
         held = [one.strips for one in tried if self._counted and one.holds]
         most = min([asked.options.max_strips, *(count - 1 for count in held)])
