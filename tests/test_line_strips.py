@@ -9,7 +9,8 @@ import pytest
 
 import gso
 from gso.mesh import Mesh
-from gso.ruled.lines import LineStrips, families, grid_copies
+from gso.ruled import lines
+from gso.ruled.lines import LineStrips, families
 from gso.ruled.solve import Wanted
 
 
@@ -378,7 +379,7 @@ def test_outlines_that_have_no_corners_or_many():
 def test_grids_laid_over_corners_have_no_points_that_coincide():
     # Both edges of a triangle at a corner may lie on one side of a grid.
     for mesh in (scaled(gso.as_mesh(dome(11))), scaled(stairs(15))):
-        copies = grid_copies(mesh)
+        copies = lines.grid_copies(mesh)
         assert copies
         for copy in copies:
             ends = copy.vertices[copy.edges]
