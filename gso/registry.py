@@ -42,8 +42,7 @@ class Plugins:
         self._broken: set[EntryPoint] = set()
 
     def _points(self) -> dict[str, EntryPoint]:
-        every = _entry_points(tuple(sys.path)).select(group=self.group)
-        found = {point.name: point for point in every}
+        found = _in_group(tuple(sys.path), self.group)
         return {name: point for name, point in found.items() if point not in self._broken}
 
     def names(self) -> list[str]:
@@ -95,6 +94,12 @@ def _entry_points(path: tuple[str, ...]) -> Any:
     from importlib.metadata import entry_points
 
     return entry_points()
+
+
+@lru_cache(maxsize=64)
+def _in_group(path: tuple[str, ...], group: str) -> dict[str, EntryPoint]:
+    """Return the entry points of a group by name: every solve asks for the linear backends."""
+    return {point.name: point for point in _entry_points(path).select(group=group)}
 
 
 def lacks(*members: str) -> Callable[[Any], str]:

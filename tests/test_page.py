@@ -11,6 +11,7 @@ import subprocess
 import sys
 import zlib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
@@ -86,6 +87,12 @@ def box() -> Mesh:
     return Mesh(
         points, [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
     )
+
+
+@cache
+def panel_in_pieces() -> gso.seams.Segmentation:
+    """The panel of the examples, searched once; no test may change it."""
+    return gso.pieces(ROOT / "examples" / "panel.obj")
 
 
 class TestData:
@@ -369,7 +376,7 @@ class TestCommands:
         assert all(panel["values"]["deviation"] == 0.0 for panel in data["panels"])
 
     def test_pieces_without_a_pattern_are_left_out(self):
-        found = gso.pieces(ROOT / "examples" / "panel.obj")
+        found = panel_in_pieces()
         some = replace(found, sheets=(found.sheets[0], *[None] * (len(found) - 1)))
         assert some.pattern is None
         made = of_pieces("panel", some, {})
@@ -411,7 +418,7 @@ class TestShow:
     SHOWN: ClassVar = {
         "optimize": lambda: gso.tno.optimize(arch()),
         "strips": lambda: gso.strips(arch()),
-        "pieces": lambda: gso.pieces(ROOT / "examples" / "panel.obj"),
+        "pieces": panel_in_pieces,
         "unfold": lambda: gso.unfold(box()),
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,6 +29,12 @@ def dome(n: int = 21, height: float = 0.35) -> Mesh:
 
 def triangulated(mesh: Mesh) -> Mesh:
     return Mesh(mesh.vertices, mesh.triangles)
+
+
+@cache
+def ball_in_pieces(max_strain: float, darts: bool) -> gso.seams.Segmentation:
+    """A ball that keeps its shape, searched once; no test may change it."""
+    return gso.pieces(ball(16), max_strain=max_strain, darts=darts)
 
 
 def torus(around: int = 36, across: int = 16) -> Mesh:
@@ -119,7 +126,7 @@ def test_less_strain_takes_longer_seams():
 
 
 def test_without_darts_no_seam_ends_inside():
-    found = gso.pieces(ball(24), max_strain=0.03, darts=False)
+    found = ball_in_pieces(0.03, darts=False)
     sound(found)
     assert found.usable
     assert len(found) > 1
@@ -264,7 +271,7 @@ def test_budgets_that_are_missed_are_named():
     strain, neck = narrow.reasons
     assert (strain.code, strain.value) == (Code.STRAIN, narrow.metrics["strain_max"])
     assert (neck.code, neck.value, neck.bound) == (Code.NECK, narrow.metrics["neck"], 1.5)
-    many = gso.pieces(ball(16), max_strain=0.03, darts=False, max_pieces=2)
+    many = gso.pieces(ball(12), max_strain=0.1, darts=False, max_pieces=1)
     assert (many.reasons[0].code, many.reasons[0].value) == (Code.PIECES, len(many))
 
 
@@ -314,7 +321,7 @@ def test_noise_is_named():
     noisy = mesh.replaced(  # a scan
         mesh.vertices * (1 + 0.02 * rng.standard_normal((len(mesh.vertices), 1)))
     )
-    found = gso.pieces(noisy, max_strain=0.01, max_pieces=40, darts=True)
+    found = gso.pieces(noisy, max_strain=0.5, darts=True)
     assert any("denoise" in note for note in found.notes)
 
 
@@ -485,7 +492,7 @@ def test_seams_follow_and_avoid_edges_also_without_darts(darts):
         z = found.design.vertices[found.edges].mean(axis=1)[:, 2]
         return float(found.lengths[z > 0.72].sum())
 
-    free = gso.pieces(mesh, max_strain=0.1, darts=darts)
+    free = ball_in_pieces(0.1, darts=darts)
     away = gso.pieces(mesh, max_strain=0.1, darts=darts, avoid=avoid)
     assert inside(away) < 0.8 * inside(free)
     same = gso.pieces(mesh, max_strain=0.1, along=[], avoid=[], darts=darts)
@@ -519,11 +526,7 @@ def test_pieces_shorter_than_min_size_are_joined_or_named():
 
 
 def test_patterns_of_an_earlier_search_are_deleted(tmp_path):
-    mesh = ball(16)
-    many, one = (
-        gso.pieces(mesh, max_strain=0.03, darts=False),
-        gso.pieces(mesh, max_strain=0.03, darts=True),
-    )
+    many, one = (ball_in_pieces(0.03, darts=darts) for darts in (False, True))
     (tmp_path / "pattern_mine.svg").write_text("mine")
     many.save(tmp_path)
     assert len(list(tmp_path.glob("pattern_*.svg"))) == len(many) + 1
@@ -545,17 +548,17 @@ def test_bounds_on_the_joint_solve_hold():
 
 
 def test_pieces_become_exactly_ruled(tmp_path):
-    cut = gso.pieces(ball(26), max_strain=0.042, darts=False)
+    cut = gso.cut(dome(13), Path([6 * 13, 6 * 13 + 12]))
     options = gso.RuledOptions(strips=2, starts=("design",), rulings=17)
     result = gso.tno.optimize(cut, formulation="ruled", options=options)
     assert result.ruled.strips == 2 * len(cut)
     assert result.details["strips"] == [2] * len(cut)
     assert result.metrics["strain_max"] < 1e-6
     # The seams of the joint result are closed, those of the strips up to a distance.
-    assert 0 < result.details["seam_gap"] < 0.1
+    assert 0 < result.details["seam_gap"] < 0.02
     assert len(result.pieces) == len(cut)
     moved = result.on_design().vertices
-    assert gso.metrics.point_to_surface(moved, result.pieces.design).max() < 0.1
+    assert gso.metrics.point_to_surface(moved, result.pieces.design).max() < 0.05
     path = tmp_path / "ruled.npz"
     result.save(path)
     again = gso.Result.load(path)
@@ -565,8 +568,8 @@ def test_pieces_become_exactly_ruled(tmp_path):
     result.save(tmp_path / "ruled.svg")
     result.save(tmp_path / "ruled.step")
     options = gso.RuledOptions(rulings=17)
-    near = gso.tno.optimize(cut, formulation="ruled", options=options, max_deviation=0.08)
+    near = gso.tno.optimize(cut, formulation="ruled", options=options, max_deviation=0.04)
     far, gap = near.ruled.deviation.there_max, near.details["seam_gap"]
-    assert (Code.DEVIATION in codes(near.reasons)) == (far > 0.08)
-    assert (Code.SEAM_GAP in codes(near.reasons)) == (gap > 0.08)
-    assert max(far, gap) <= 1.1 * 0.08
+    assert (Code.DEVIATION in codes(near.reasons)) == (far > 0.04)
+    assert (Code.SEAM_GAP in codes(near.reasons)) == (gap > 0.04)
+    assert max(far, gap) <= 1.1 * 0.04

@@ -66,7 +66,7 @@ class Sheet:
         """Faces that are inverted."""
         return metrics.flipped_faces(self.mesh, self.flat)
 
-    @property
+    @cached_property
     def sound(self) -> bool:
         """Whether nothing overlaps and nothing is inverted."""
         return not (len(self.inverted) or len(faults.overlaps(self.mesh, self.flat)))

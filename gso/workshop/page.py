@@ -11,6 +11,7 @@ import base64
 import json
 import zlib
 from collections.abc import Callable, Sequence
+from functools import cache
 from html import escape
 from importlib.resources import files
 
@@ -81,7 +82,7 @@ def page_html(
         "</main>",
         _packed("page-data", json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
         _packed("page-arrays", arrays),
-        _packed("page-script", _file("page.js").encode()),
+        _script(),
         f"<script>{_file('boot.js')}</script>",
         "</body></html>",
     ]
@@ -96,6 +97,12 @@ def _packed(name: str, data: bytes) -> str:
     """Return data for the script of the page: compressed, as base64."""
     code = base64.b64encode(zlib.compress(data, 9)).decode()
     return f'<script type="text/plain" id="{name}">{code}</script>'
+
+
+@cache
+def _script() -> str:
+    """Return the script of the page, packed once for all pages of a process."""
+    return _packed("page-script", _file("page.js").encode())
 
 
 def _section(name: str, title: str, lines: Sequence[str]) -> list[str]:
