@@ -11,6 +11,7 @@ import base64
 import json
 import zlib
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from html import escape
 from importlib.resources import files
 
@@ -81,11 +82,17 @@ def page_html(
         "</main>",
         _packed("page-data", json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
         _packed("page-arrays", arrays),
-        _packed("page-script", _file("page.js").encode()),
+        _script(),
         f"<script>{_file('boot.js')}</script>",
         "</body></html>",
     ]
     return "\n".join(lines) + "\n"
+
+
+@lru_cache(maxsize=1)
+def _script() -> str:
+    """Return the script, which is the same for all pages of a process."""
+    return _packed("page-script", _file("page.js").encode())
 
 
 def _file(name: str) -> str:
