@@ -6,6 +6,7 @@ import doctest
 import importlib
 import sys
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,15 @@ def load(name):
     if name == "sheet_metal":
         pytest.importorskip("OCP", exc_type=ImportError)
     return importlib.import_module(name)
+
+
+@cache
+def whole(name):
+    """Vertices and faces of a design of whole.py, read only."""
+    vertices, faces = load("whole").DESIGNS[name]()
+    for array in (vertices, faces):
+        array.flags.writeable = False
+    return vertices, faces
 
 
 class Connectivity:
@@ -319,7 +329,7 @@ WHOLE = {
 @pytest.mark.parametrize("name", WHOLE)
 def test_whole_design(name):
     components, loops, count, angle, size = WHOLE[name]
-    vertices, faces = load("whole").DESIGNS[name]()
+    vertices, faces = whole(name)
     mesh = Connectivity(faces)
     assert len(faces) == count
     assert np.array_equal(np.unique(faces), np.arange(len(vertices)))
@@ -349,8 +359,7 @@ def test_whole_design(name):
     ],
 )
 def test_whole_design_at_another_resolution(name, resolution, count):
-    whole = load("whole")
-    vertices, faces = whole.DESIGNS[name](resolution)
+    vertices, faces = load("whole").DESIGNS[name](resolution)
     mesh = Connectivity(faces)
     assert len(faces) == count
     assert (mesh.is_manifold(), mesh.components(), mesh.loops()) == (True, *WHOLE[name][:2])
@@ -359,7 +368,7 @@ def test_whole_design_at_another_resolution(name, resolution, count):
 
 @pytest.mark.parametrize("name", ["sphere", "helmet", "teapot"])
 def test_hollow_design_faces_out(name):
-    vertices, faces = load("whole").DESIGNS[name]()
+    vertices, faces = whole(name)
     piece = Connectivity(faces).pieces()[faces[:, 0]]
     for p in np.unique(piece):
         corners = vertices[faces[piece == p]]
@@ -369,20 +378,20 @@ def test_hollow_design_faces_out(name):
 
 @pytest.mark.parametrize("name, side", [("hull", -1), ("canopy", 1), ("quad_dome", 1)])
 def test_open_design_faces_one_way(name, side):
-    vertices, faces = load("whole").DESIGNS[name]()
+    vertices, faces = whole(name)
     corners = vertices[faces]
     up = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])[:, 2]
     assert np.all(side * up > 0)
 
 
 def test_sphere_has_its_radius_and_twelve_corners():
-    vertices, faces = load("whole").sphere()
+    vertices, faces = whole("sphere")
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 500)
     assert Connectivity(faces).inner_valences() == {5: 12, 6: 2550}
 
 
 def test_quad_dome_has_four_irregular_vertices_and_its_formula():
-    vertices, faces = load("whole").quad_dome()
+    vertices, faces = whole("quad_dome")
     assert Connectivity(faces).inner_valences() == {3: 4, 4: 1621}
     x, y, z = vertices.T / 1000
     np.testing.assert_allclose(z, 3 * (1 - (x / 7) ** 2 - (y / 5.5) ** 2), atol=1e-9)
@@ -390,7 +399,7 @@ def test_quad_dome_has_four_irregular_vertices_and_its_formula():
 
 @pytest.mark.parametrize("name", ["helmet", "hull"])
 def test_helmet_and_hull_are_mirror_symmetric(name):
-    vertices, faces = load("whole").DESIGNS[name]()
+    vertices, faces = whole(name)
     distance, other = cKDTree(vertices).query(vertices * [1, -1, 1])
     assert distance.max() < 1e-6
     mirrored = {frozenset(f) for f in other[faces].tolist()}
@@ -398,7 +407,7 @@ def test_helmet_and_hull_are_mirror_symmetric(name):
 
 
 def test_hull_is_pointed_in_front_and_round_behind():
-    vertices, _ = load("whole").hull()
+    vertices, _ = whole("hull")
     t = 0.5 - vertices[:, 0] / 6000
     sheer = 450 * (1 - t) ** 2 + 120 * t**2
     keel = 900 * (1 - (1 - t) ** 6) * np.sqrt(np.maximum(1 - t**4, 0))
@@ -410,7 +419,7 @@ def test_hull_is_pointed_in_front_and_round_behind():
 
 
 def test_canopy_is_curved_both_ways():
-    vertices, faces = load("whole").canopy()
+    vertices, faces = whole("canopy")
     curvature = np.full(len(vertices), 2 * np.pi)
     np.subtract.at(curvature, faces, np.radians(corner_angles(vertices, faces)))
     inner = np.setdiff1d(np.arange(len(vertices)), list(Connectivity(faces).boundary))
@@ -419,7 +428,7 @@ def test_canopy_is_curved_both_ways():
 
 def test_whole_teapot_lies_on_its_patches():
     teapot = load("teapot")
-    vertices = load("whole").teapot()[0] / 50
+    vertices = whole("teapot")[0] / 50
     t = np.linspace(0, 1, 65)
     grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
     miss = np.full(len(vertices), np.inf)
@@ -475,7 +484,7 @@ def test_fox_is_closed_symmetric_and_as_high_as_it_says():
 
 
 def test_scan_is_the_helmet_with_noise():
-    helmet, _ = load("whole").helmet()
+    helmet, _ = whole("helmet")
     noise = load("scan").scan()[0] - helmet
     assert noise.std() == pytest.approx(load("scan").NOISE, rel=0.03)
 

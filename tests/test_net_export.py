@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ from gso.net import (  # noqa: E402
 )
 from tests.test_net import shaken  # noqa: E402
 
-# An export takes ten seconds, also of a small net.
+# An export takes some seconds, also of a small net.
 pytestmark = pytest.mark.slow
 
 SMALL = {"widths": (8, 8, 8), "depths": (1, 1, 1)}
@@ -51,19 +52,46 @@ def nets():
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """The nets, and their exported files."""
-    folder = tmp_path_factory.mktemp("exported")
-    found = {}
-    for name, net in nets().items():
-        (path,) = export(net, folder / f"{name}.onnx")
-        found[name] = net, path
-    return found
+    """A function that returns a net of `nets` and its exported file, made at the first call.
+
+    All passes are exported from weights beside the file, and fewer ones from the net itself.
+    """
+    folder, known = tmp_path_factory.mktemp("exported"), nets()
+
+    @cache
+    def exported(name, passes=None):
+        net = known[name]
+        if passes is not None:
+            return net, export(net, folder / f"{name}-{passes}.onnx", passes=passes)[0]
+        weights = folder / f"{name}.safetensors"
+        save(net, weights, dtype=torch.float32)
+        return net, export(weights, folder / f"{name}.onnx")[0]
+
+    return exported
+
+
+@pytest.fixture(scope="module")
+def packaged(tmp_path_factory):
+    """A function that returns exported files of a net of the package, made at the first call.
+
+    Those of a net that is part of a chain are the chain's.
+    """
+    folder = tmp_path_factory.mktemp("packaged")
+
+    @cache
+    def exported(name, passes=None):
+        for chain, parts in CHAINS.items():
+            if name in parts and passes is None:
+                return [exported(chain)[parts.index(name)]]
+        return export(name, folder / f"{name}-{passes or 'all'}.onnx", passes=passes)
+
+    return exported
 
 
 @pytest.mark.parametrize("name", ["coarse", "trusted", "flat", "noise"])
 @pytest.mark.parametrize("shape", [(64, 64), (40, 90), (3, 64, 64)])
 def test_predictions_are_those_of_pytorch(files, name, shape):
-    net, path = files[name]
+    net, path = files(name)
     rng = np.random.default_rng(0)
     points = saddle(91)[: shape[-2], : shape[-1]]
     points = 7.0 * points + 1e-3 * rng.normal(size=(*shape, 3)) * (name == "noise") + 100.0
@@ -78,7 +106,7 @@ def test_predictions_are_those_of_pytorch(files, name, shape):
 
 
 def test_the_file_is_described(files):
-    net, path = files["noise"]
+    net, path = files("noise")
     card = read_card(path)
     assert path.with_name("noise.onnx.json").exists()
     assert card["task"] == "denoise" and card["model"]["kind"] == "gsonet"
@@ -102,8 +130,8 @@ def test_the_file_is_described(files):
 
 
 def test_fewer_passes(files, tmp_path):
-    net, path = files["coarse"]
-    (once,) = export(net, tmp_path / "once.onnx", passes=1)
+    net, path = files("coarse")
+    _, once = files("coarse", 1)
     more = {"passes": 1, "guarded": False}
     ours, theirs = (predict(saddle(64), model=m, **more) for m in (net, once))
     assert np.abs(ours - theirs).max() < CLOSE < np.abs(ours - saddle(64)).max()
@@ -114,7 +142,7 @@ def test_fewer_passes(files, tmp_path):
 
 
 def test_several_nets_one_after_the_other(files):
-    net, path = files["coarse"]
+    net, path = files("coarse")
     # Random weights add curvature, so that a guarded prediction would be the input.
     more = {"guarded": False}
     twice = predict(predict(saddle(64), model=net, **more), model=net, **more)
@@ -127,18 +155,17 @@ def test_several_nets_one_after_the_other(files):
 class TestFiles:
     @pytest.fixture
     def path(self, files, tmp_path):
-        _, path = files["coarse"]
+        _, path = files("coarse")
         for source in (path, path.with_name("coarse.onnx.json")):
             (tmp_path / source.name).write_bytes(source.read_bytes())
         return tmp_path / "coarse.onnx"
 
-    def test_the_card_of_the_weights_beside_it_stays(self, tmp_path):
-        net = nets()["noise"]
-        save(net, tmp_path / "net.safetensors")
-        before = (tmp_path / "net.json").read_bytes()
-        export(tmp_path / "net.safetensors", tmp_path / "net.onnx")
-        assert (tmp_path / "net.json").read_bytes() == before
-        assert load(tmp_path / "net.safetensors").task == "denoise"
+    def test_the_card_of_the_weights_beside_it_stays(self, files, tmp_path):
+        net, path = files("noise")
+        save(net, tmp_path / "noise.safetensors", dtype=torch.float32)
+        card = path.with_name("noise.json")
+        assert card.read_bytes() == (tmp_path / "noise.json").read_bytes()
+        assert load(path.with_name("noise.safetensors")).task == "denoise"
 
     def test_damage(self, path):
         data = bytearray(path.read_bytes())
@@ -215,9 +242,8 @@ def run_without(hidden, code, folder):
 
 
 def test_predictions_and_starts_without_pytorch(files, tmp_path):
-    net, path = files["coarse"]
-    once = tmp_path / "once.onnx"
-    export(net, once, passes=1)
+    net, path = files("coarse")
+    _, once = files("coarse", 1)
     points = saddle(40)
     np.save(tmp_path / "points.npy", points)
     code = f"""
@@ -236,10 +262,9 @@ print("torch" in sys.modules)
     assert np.abs(moved - predict(points, model=net)).max() < CLOSE
 
 
-def test_hybrid_solves_without_pytorch(tmp_path):
+def test_hybrid_solves_without_pytorch(packaged, tmp_path):
     # A net of the package: starts from random weights would be dropped.
-    (twice,) = export("developable", tmp_path / "twice.onnx")
-    (once,) = export("developable", tmp_path / "once.onnx", passes=1)
+    (twice,), (once,) = packaged("developable"), packaged("developable", 1)
     assert [read_card(path)["onnx"]["passes"] for path in (twice, once)] == [2, 1]
     points = saddle(64)
     np.save(tmp_path / "points.npy", points)
@@ -287,7 +312,7 @@ def test_without_the_runtime(files, tmp_path):
     np.save(tmp_path / "points.npy", saddle(8))
     code = f"""
 try:
-    gso.net.predict(points, model={str(files["coarse"][1])!r})
+    gso.net.predict(points, model={str(files("coarse")[1])!r})
 except gso.BackendError as error:
     print(error)
 """
@@ -295,9 +320,9 @@ except gso.BackendError as error:
 
 
 @pytest.mark.parametrize("name", available())
-def test_every_net_of_the_package(name, tmp_path):
+def test_every_net_of_the_package(name, packaged):
     task = load(CHAINS.get(name, (name,))[0]).task
-    exported = export(name, tmp_path / f"{name}.onnx")
+    exported = packaged(name)
     assert len(exported) == len(CHAINS.get(name, (name,)))
     for points in (saddle(64), saddle(64)[:40]):
         ours, theirs = (predict(points, task=task, model=m) for m in (name, exported))

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -56,6 +57,7 @@ TINY = Settings(
     repeats=2,
     examples=(0.3,),
     workers=0,
+    apart=False,
 )
 
 
@@ -555,6 +557,11 @@ def test_shares_and_limit_of_a_solve(task):
         assert found["factorisations"] >= found["iterations"] > 0
 
 
+def test_a_size_is_timed_in_a_process_of_its_own():
+    found = timing._measured("denoise", "TNO", "", 16, 2, apart=True)
+    assert len(found["seconds"]) == 2 and min(found["seconds"]) > 0 and found["peak_mb"] > 10
+
+
 # ---------------------------------------------------------------- docs
 
 
@@ -615,18 +622,33 @@ def test_designs_are_cut_again_with_other_numbers():
     np.testing.assert_allclose(*corners)
 
 
-def test_sections_are_listed_and_take_settings(tmp_path):
-    def ran(*words):
-        command = [sys.executable, ROOT / "bench" / "run_all.py", "--only", *words]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+def test_sections_are_listed_and_take_settings(monkeypatch, capsys):
+    with patch.dict(os.environ):
+        run_all = importlib.import_module("run_all")
 
-    listed = ran("list").stdout
+    def ran(*words):
+        monkeypatch.setattr(sys, "argv", ["run_all.py", "--only", *words])
+        run_all.main()
+
+    ran("list")
+    listed = capsys.readouterr().out
     for name in ("tno.developable", "jiang.bend", "hybrid.speed", "net.rows", "dataset.statistics"):
         assert name in listed
-    done = ran("borders", "kind=symmetric", "preset=fast", "--json", "figures.json")
+    for words, said in (
+        (("nonsense",), "no section nonsense"),
+        (("borders", "nonsense=1"), "no setting nonsense"),
+        (("net.rows",), "needs data="),
+    ):
+        with pytest.raises(SystemExit):
+            ran(*words)
+        assert said in capsys.readouterr().err
+
+
+def test_a_section_runs_as_a_script_and_writes_its_figures(tmp_path):
+    command = [sys.executable, ROOT / "bench" / "run_all.py", "--only", "session.drags"]
+    command += ["n=8", "count=1", "--json", "figures.json"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert "8 x 8, medians of 1 surfaces" in done.stdout
     figures = json.loads((tmp_path / "figures.json").read_text())
-    assert {"machine", "borders.borders"} == set(figures)
-    assert "no section nonsense" in ran("nonsense").stderr
-    assert "no setting nonsense" in ran("borders", "nonsense=1").stderr
-    assert "needs data=" in ran("net.rows").stderr
+    assert {"machine", "session.drags"} == set(figures)

@@ -31,6 +31,9 @@ class Settings:
         Mean curvatures; the figures show the surfaces nearest to these.
     workers : int
         Worker processes for what is not timed; 0 for this process only.
+    apart : bool
+        Whether each method is timed at each size in a process of its own. Otherwise its peak memory
+        is that of this process.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Settings:
     repeats: int = 5
     examples: tuple[float, ...] = (0.1, 0.3, 0.7)
     workers: int = 2
+    apart: bool = True
 
 
 FULL = Settings(

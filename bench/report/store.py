@@ -96,8 +96,14 @@ def digest(key: Any) -> str:
 
 def solver() -> str:
     """Digest of the code that the optimiser's results and all metrics depend on."""
+    return package(*_solver_parts())
+
+
+@lru_cache(maxsize=1)
+def _solver_parts() -> tuple[str, ...]:
+    """Return the files and folders of the package but those in :data:`_ASIDE`."""
     parts = {path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")}
-    return package(*sorted(parts.difference(_ASIDE)))
+    return tuple(sorted(parts.difference(_ASIDE)))
 
 
 @lru_cache(maxsize=8)

@@ -1,4 +1,4 @@
-"""Time against size: optimiser with either kernels, net, hybrid, each in its own process."""
+"""Time against size: optimiser with either kernels, net, hybrid."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from harness import quietly
 
 from gso.net import tasks as net_tasks
-from report import kernels, store
+from report import kernels, measure, store
 from report.method import TASKS, Method
 from report.methods import DEFAULT, methods, of
 from report.settings import Settings
@@ -101,7 +102,9 @@ def timings(settings: Settings, kept: Store, tick: Callable[..., None]) -> list[
             }
             known = kept.find(place, key)
             if known is None:
-                known = _measured(task, name, method.net, size, settings.repeats)
+                known = _measured(
+                    task, name, method.net, size, settings.repeats, apart=settings.apart
+                )
                 if "absent" not in known:
                     kept.keep(place, key, known)
             timing = Timing(task, name, size, **known)
@@ -136,18 +139,22 @@ def _absent(name: str, method: Method) -> str:
     return method.absent()
 
 
-def _measured(task: str, method: str, model: str, size: int, repeats: int) -> dict[str, Any]:
-    asked = {"task": task, "method": method, "model": model, "size": size}
-    command = [sys.executable, str(_SCRIPT), json.dumps(asked | _limits(repeats))]
+def _measured(
+    task: str, method: str, model: str, size: int, repeats: int, *, apart: bool
+) -> dict[str, Any]:
+    asked = {"task": task, "method": method, "model": model, "size": size} | _limits(repeats)
+    command = [sys.executable, str(_SCRIPT), json.dumps(asked)]
     one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     with kernels.chosen(_choice(method)):
+        if not apart:
+            return quietly(measure.main, **asked)
         done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **one})
     if done.returncode:
         return {"absent": f"failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}"}
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def _limits(repeats: int) -> dict[str, float]:
+def _limits(repeats: int) -> dict[str, Any]:
     return {"repeats": repeats, "budget": _BUDGET}
 
 

@@ -6,7 +6,8 @@ import copy
 import hashlib
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -136,6 +137,10 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
         )
     own = copy.deepcopy(net).cpu().eval().requires_grad_(False)
     own.bf16 = False
+    for part in own.modules():
+        # An activation in place has no ONNX operator, and would be decomposed with all its shapes.
+        if isinstance(part, nn.LeakyReLU):
+            part.inplace = False
     module = _Exported(own, passes).eval()
     # Two surfaces: an example of one would fix the size of the batch.
     example = (torch.rand(2, SIZE, SIZE, 3), torch.full((2,), 0.01))[: len(inputs)]
@@ -143,7 +148,7 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
     module(*example)
     batch = torch.export.Dim("batch")
     shapes = {name: {0: batch} for name in inputs}
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _untraced():
         warnings.simplefilter("ignore")
         try:
             traced = torch.export.export(module, example, dynamic_shapes=shapes, strict=False)
@@ -163,6 +168,22 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
             raise BackendError(f"the net cannot be exported: {error}") from error
     content: bytes = program.model_proto.SerializeToString()
     return content
+
+
+@contextmanager
+def _untraced() -> Iterator[None]:
+    """Keep PyTorch from recording the Python stack of every operation.
+
+    That takes most of the time of an export, and writes the names of this machine's folders to the
+    file.
+    """
+    config: Any = import_module("torch.fx.config")
+    before = getattr(config, "do_not_emit_stack_traces", False)
+    config.do_not_emit_stack_traces = True
+    try:
+        yield
+    finally:
+        config.do_not_emit_stack_traces = before
 
 
 def _operators() -> dict[Any, Callable[..., Any]]:
