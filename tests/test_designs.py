@@ -115,6 +115,7 @@ def test_a_seed_gives_the_same_designs_again(kind):
     )
 
 
+@pytest.mark.slow
 def test_isometry_is_no_worse_than_its_start():
     design = designs.holes(0)[6].mesh
     start = gso.tno.optimize(design)

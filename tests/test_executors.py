@@ -16,10 +16,22 @@ import numpy as np
 import pytest
 
 import gso
-from gso.executors import SERIAL, ProcessExecutor, exchange, open_executor, useful_workers
+from gso.executors import SERIAL, ProcessExecutor, exchange, open_executor
 from gso.mesh import Mesh
 from gso.pipeline import strains_of
 from tests.conftest import sphere_cap
+from tests.worker_functions import (
+    large,
+    leave,
+    leave_others,
+    lock,
+    nested,
+    odd,
+    refuse,
+    sleep,
+    sleep_and_tell,
+    square,
+)
 
 
 @pytest.fixture(scope="module")
@@ -35,57 +47,6 @@ def executor(request, two):
     else:
         with open_executor(["serial", "one"].index(request.param)) as own:
             yield own
-
-
-def square(x):
-    if x < 0:
-        raise ValueError(f"{x} is negative")
-    return x * x, os.getpid()
-
-
-def refuse(x):
-    raise gso.MeshError(f"face {x} is bad")
-
-
-class Odd(Exception):
-    """An exception that cannot be read where it is sent to."""
-
-    def __init__(self, one, other):
-        super().__init__(f"{one} and {other}")
-
-
-def odd(x):
-    raise Odd(x, x)
-
-
-def leave(x):
-    if x == 2:
-        os._exit(1)
-    return 10 * x
-
-
-def leave_others(x):
-    if os.getpid() != x:
-        os._exit(1)
-    return x
-
-
-def lock(x):
-    return Lock()
-
-
-def sleep(seconds):
-    time.sleep(seconds)
-    return seconds
-
-
-def large(size):
-    return bytes(size)
-
-
-def nested(x):
-    with ProcessExecutor(1) as own:
-        return [item.result for item in own.as_completed(abs, [x])], useful_workers(9)
 
 
 def results(executor, function, items):
@@ -136,11 +97,6 @@ class TestResults:
         assert len(set(results(two, sleep_and_tell, [0.2] * 4).values())) == 2
 
 
-def sleep_and_tell(seconds):
-    time.sleep(seconds)
-    return os.getpid()
-
-
 class TestSurvival:
     def test_the_item_that_ends_its_worker_is_found(self, two):
         items = {item.index: item for item in two.as_completed(leave, range(6))}
@@ -148,12 +104,12 @@ class TestSurvival:
         assert "the worker process died" in items[2].error
 
     def test_an_item_of_a_killed_worker_is_repeated(self, two):
-        found = two.as_completed(sleep, [0.01, 1.0, 1.0])
+        found = two.as_completed(sleep, [0.01, 0.5, 0.5])
         next(found)
-        time.sleep(0.2)
+        time.sleep(0.1)
         for process in active_children():
             os.kill(process.pid, signal.SIGKILL)
-        assert [item.result for item in found] == [1.0, 1.0]
+        assert [item.result for item in found] == [0.5, 0.5]
 
     def test_a_worker_may_die_while_it_sends_its_result(self, two):
         def kill():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,14 +51,26 @@ def same(a, b):
     return a.energy == b.energy
 
 
+@pytest.fixture(scope="module")
+def optimum(surfaces):
+    """Solves without a start, by the number of the surface; each is made once."""
+    return cache(lambda number, **keywords: tno.optimize(surfaces[number], **keywords))
+
+
+@cache
+def optimum_of_saddle(n, **keywords):
+    """A solve of a saddle without a start, made once."""
+    return tno.optimize(saddle(n), **keywords)
+
+
 # ---------------------------------------------------------------- starts
 
 
-def test_a_guarded_start_that_is_worse_is_dropped(surfaces):
+def test_a_guarded_start_that_is_worse_is_dropped(surfaces, optimum):
     design = surfaces[0]
     rng = np.random.default_rng(0)
     start = Start(design + 0.1 * rng.standard_normal(design.shape), source="guess", guarded=True)
-    cold, result = tno.optimize(design), tno.optimize(design, x0=start)
+    cold, result = optimum(0), tno.optimize(design, x0=start)
     assert same(cold, result)
     assert result.warm_start == "cold"
     said = [note for note in result.notes if note not in cold.notes]
@@ -65,9 +78,9 @@ def test_a_guarded_start_that_is_worse_is_dropped(surfaces):
     assert "the start (guess) was not used: its energy" in said[0]
 
 
-def test_a_guarded_start_that_is_better_is_used(surfaces):
+def test_a_guarded_start_that_is_better_is_used(surfaces, optimum):
     design = surfaces[0]
-    good = tno.optimize(design, verdict=False)
+    good = optimum(0, verdict=False)
     start = Start(good.mesh, source="guess", guarded=True)
     result = tno.optimize(design, x0=start, verdict=False)
     assert result.warm_start == "guess"
@@ -78,7 +91,7 @@ def test_a_search_is_the_same_once_its_start_is_dropped():
     design = saddle(9)
     start = Start(2.0 * design, source="guess", guarded=True)
     for keywords in ({"target_curvature": 0.2}, {"max_deviation": 0.05}):
-        cold, result = tno.optimize(design, **keywords), tno.optimize(design, x0=start, **keywords)
+        cold, result = optimum_of_saddle(9, **keywords), tno.optimize(design, x0=start, **keywords)
         assert same(cold, result)
         assert (result.warm_start, result.iterations) == ("cold", cold.iterations)
 
@@ -93,7 +106,7 @@ def test_a_search_may_begin_at_its_own_results(monkeypatch):
         return usable(self, *requests)
 
     monkeypatch.setattr(Run, "usable_start", counted)
-    near = Start(tno.optimize(design, verdict=False).mesh, source="guess", guarded=True)
+    near = Start(optimum_of_saddle(9, verdict=False).mesh, source="guess", guarded=True)
     assert tno.optimize(design, x0=near, target_curvature=0.2).warm_start == "guess"
     assert len(seen) == 1
 
@@ -118,9 +131,9 @@ def test_the_tolerance_of_a_start_is_a_number(tolerance):
         Start(None, tolerance=tolerance)
 
 
-def test_a_tolerance_ends_solves_from_a_start_only(surfaces):
+def test_a_tolerance_ends_solves_from_a_start_only(surfaces, optimum):
     design = surfaces[1]
-    cold = tno.optimize(design)
+    cold = optimum(1)
     assert same(cold, tno.optimize(design, x0=Start(None, tolerance=0.5)))
     near = tno.optimize(design, options="fast").mesh
     closely, loosely = (
@@ -130,9 +143,9 @@ def test_a_tolerance_ends_solves_from_a_start_only(surfaces):
     assert energy(closely) < energy(loosely)
 
 
-def test_a_joint_solve_that_is_done_does_not_begin_again_on_a_coarser_grid(surfaces):
+def test_a_joint_solve_that_is_done_does_not_begin_again_on_a_coarser_grid(surfaces, optimum):
     design = surfaces[0]
-    cold = tno.optimize(design, options="jiang2020")
+    cold = optimum(0, options="jiang2020")
     again = tno.optimize(design, options="jiang2020", x0=cold.mesh)
     assert {p.name for p in again.history} == {cold.history[-1].name}
     assert energy(again) <= 1.001 * energy(cold)
@@ -146,11 +159,11 @@ def test_a_joint_solve_that_is_done_does_not_begin_again_on_a_coarser_grid(surfa
     [{}, {"formulation": "isometry"}, {"task": "flatten"}, {"max_deviation": 0.1}],
     ids=["curvature", "isometry", "flatten", "bound"],
 )
-def test_iterations_of_a_start_are_counted_over_all_stages(surfaces, keywords, most):
+def test_iterations_of_a_start_are_counted_over_all_stages(surfaces, optimum, keywords, most):
     design = surfaces[1]
     start = design
     if keywords.get("task") == "flatten":
-        start = tno.optimize(design, task="flatten").flat_grid
+        start = optimum(1, task="flatten").flat_grid
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", gso.ConvergenceWarning)
         result = tno.optimize(design, x0=Start(start, iterations=most), **keywords)
@@ -228,7 +241,7 @@ def test_a_target_needs_more_than_one_solve_without_a_net():
 @needs_torch
 @pytest.mark.parametrize("formulation", ["curvature", "isometry"])
 def test_a_random_net_costs_time_not_quality(surfaces, formulation):
-    design = surfaces[0]
+    design = surfaces[0][::2, ::2]
     cold = tno.optimize(design, formulation=formulation)
     result = hybrid.solve(design, net=made(size=0.5), formulation=formulation)
     assert same(cold, result)
@@ -238,8 +251,8 @@ def test_a_random_net_costs_time_not_quality(surfaces, formulation):
 
 
 @needs_torch
-def test_a_random_net_costs_time_not_quality_flat(surfaces):
-    cold = tno.optimize(surfaces[0], task="flatten")
+def test_a_random_net_costs_time_not_quality_flat(surfaces, optimum):
+    cold = optimum(0, task="flatten")
     result = hybrid.solve(surfaces[0], task="flatten", net=made("flatten", size=5.0))
     assert same(cold, result)
 
@@ -303,7 +316,7 @@ def predicts(monkeypatch, points):
     ids=["nan", "point", "points", "flat point", "mirrored"],
 )
 def test_nonsense_is_dropped_polished_or_not(monkeypatch, keywords, points, words, polish):
-    cold = tno.optimize(saddle(9), **keywords)
+    cold = optimum_of_saddle(9, **keywords)
     predicts(monkeypatch, points)
     result = hybrid.solve(saddle(9), polish=polish, **keywords)
     assert same(cold, result)
@@ -345,7 +358,7 @@ def test_a_bound_holds_for_the_net_alone(surfaces, coarse_net):
 
 def test_polish_as_numpy_has_it(coarse_net):
     for given, plain in ((np.True_, True), (np.False_, False), (np.int64(2), 2)):
-        here, there = (hybrid.solve(saddle(13), polish=p) for p in (given, plain))
+        here, there = (hybrid.solve(saddle(9), polish=p) for p in (given, plain))
         assert same(here, there)
 
 
@@ -365,12 +378,12 @@ def test_polish_is_bounded(surfaces, coarse_net, most, net):
     assert result.warm_start == ("net" if net == "fair" else "cold")
 
 
-def test_polish_goes_on_where_the_net_ended(surfaces, coarse_net):
+def test_polish_goes_on_where_the_net_ended(surfaces, optimum, coarse_net):
     # A solve near the design, which may follow, has another energy.
     alone = hybrid.solve(surfaces[0], polish=False, verdict=False)
     some = hybrid.solve(surfaces[0], polish=3, verdict=False)
     whole = hybrid.solve(surfaces[0], verdict=False)
-    cold = tno.optimize(surfaces[0], verdict=False)
+    cold = optimum(0, verdict=False)
     assert energy(alone) > energy(some) > energy(whole)
     assert energy(whole) < 1.1 * energy(cold)
     assert whole.iterations < cold.iterations
@@ -447,17 +460,17 @@ def test_a_net_of_another_task_is_refused():
 # ---------------------------------------------------------------- without one
 
 
-def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces):
+def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces, optimum):
     monkeypatch.setattr("gso.net.catalogue.find_spec", lambda name: None)
-    cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
+    cold, result = optimum(0), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "torch" in result.notes[-1]
     assert result.warm_start == "cold"
 
 
-def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces):
+def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces, optimum):
     monkeypatch.setattr("gso.hybrid.warm_start.available", lambda task: [])
-    cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0])
+    cold, result = optimum(0), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "no net" in result.notes[-1]
 
@@ -613,7 +626,7 @@ def test_a_closed_mesh_is_no_patch():
 @needs_torch
 @pytest.mark.parametrize("task", ["developable", "flatten"])
 def test_a_net_alone_takes_meshes_and_starts_no_solve_of_them(task):
-    mesh = ragged(hole=2)
+    mesh = ragged(17, hole=2)
     alone = hybrid.solve(mesh, task=task, net=made(task), polish=False)
     assert alone.warm_start == "net"
     if task == "developable":
@@ -697,6 +710,15 @@ def test_where_a_net_pays(measurements, size, keywords, many, expected):
     assert not net_saves_time(Mesh(mesh.vertices, mesh.triangles), "developable", keywords)
 
 
+@cache
+def design_and_optimum(**keywords):
+    """A design, cut into pieces where there are no keywords, and its result without a net."""
+    design = Mesh.from_grid(saddle(9))
+    if not keywords:
+        design = gso.cut(design, gso.seams.Path([4 * 9, 4 * 9 + 8]))
+    return design, tno.optimize(design, verdict=False, **keywords)
+
+
 @pytest.mark.parametrize("sparing", [True, False])
 @pytest.mark.parametrize(
     ("keywords", "words"),
@@ -710,10 +732,7 @@ def test_a_cold_start_where_nets_were_not_found_to_help(monkeypatch, keywords, w
     monkeypatch.setattr(
         "gso.hybrid.solving.predictions", lambda designs, **_: [1 / 0 for _ in designs]
     )
-    design = Mesh.from_grid(saddle(13))
-    if not keywords:
-        design = gso.cut(design, gso.seams.Path([6 * 13, 6 * 13 + 12]))
-    cold = tno.optimize(design, verdict=False, **keywords)
+    design, cold = design_and_optimum(**keywords)
     result = hybrid.solve(design, verdict=False, sparing=sparing, **keywords)
     (item,) = hybrid.solve_many([design], workers=0, verdict=False, sparing=sparing, **keywords)
     # With `sparing` the result is that of the optimiser, and its notes are, too.
@@ -751,9 +770,15 @@ def test_measured_times_rise_with_the_size():
 # ---------------------------------------------------------------- large grids
 
 
-def test_a_start_of_known_resolution_reaches_the_same_energy(surfaces):
+@pytest.fixture(scope="module")
+def large(surfaces):
+    """A large grid, solved on coarser ones first, and its result without a start."""
     design = resample(surfaces[0], 80, 70)
-    cold = tno.optimize(design, verdict=False)
+    return design, tno.optimize(design, verdict=False)
+
+
+def test_a_start_of_known_resolution_reaches_the_same_energy(large):
+    design, cold = large
     near = tno.optimize(design, options="fast", verdict=False).mesh
     start = Start(near, source="guess", guarded=True, resolution=40)
     result = tno.optimize(design, x0=start, verdict=False)
@@ -763,19 +788,17 @@ def test_a_start_of_known_resolution_reaches_the_same_energy(surfaces):
     assert [p.name for p in result.history if p.iteration == 0][-2:] == ["40x35", "normal"]
 
 
-def test_a_solved_start_is_not_solved_on_coarser_grids(surfaces):
-    design = resample(surfaces[0], 80, 70)
-    cold = tno.optimize(design, verdict=False)
+def test_a_solved_start_is_not_solved_on_coarser_grids(large):
+    design, cold = large
     start = Start(cold.mesh, source="guess", resolution=64, solved=True)
     result = tno.optimize(design, x0=start, verdict=False)
     assert {p.name for p in result.history} == {"normal"}
     assert energy(result) <= 1.001 * energy(cold)
 
 
-def test_the_better_of_two_starts_is_refined(surfaces):
-    design = Mesh.from_grid(resample(surfaces[0], 80, 70))
+def test_the_better_of_two_starts_is_refined(large):
+    design, cold = Mesh.from_grid(large[0]), large[1]
     options = gso.DevelopableOptions()
-    cold = tno.optimize(design, verdict=False)
     for points, source in ((cold.mesh.vertices, "net"), (design.vertices * [1, 1, 1.3], "cold")):
         start = better_start(design, points, 64, options, tno.optimize, judged=False)
         assert (start.resolution, start.solved) == (40, True)
@@ -829,18 +852,18 @@ def test_less_may_be_left_with_more_effort(surfaces, coarse_net):
         hybrid.solve(surfaces[1], effort=0)
 
 
-def test_a_cold_solve_may_end_earlier(surfaces):
-    whole = tno.optimize(surfaces[0], verdict=False)
+def test_a_cold_solve_may_end_earlier(surfaces, optimum):
+    whole = optimum(0, verdict=False)
     early = tno.optimize(surfaces[0], x0=Start(None, remaining=0.01), verdict=False)
     assert early.iterations < whole.iterations
     assert energy(early) <= 1.02 * energy(whole)
 
 
-def test_no_net_is_asked_where_it_does_not_pay(surfaces, monkeypatch):
+def test_no_net_is_asked_where_it_does_not_pay(surfaces, optimum, monkeypatch):
     monkeypatch.setattr(
         "gso.hybrid.solving.predictions", lambda designs, **_: [1 / 0 for _ in designs]
     )
-    cold, result = tno.optimize(surfaces[0]), hybrid.solve(surfaces[0], sparing=True)
+    cold, result = optimum(0), hybrid.solve(surfaces[0], sparing=True)
     (item,) = hybrid.solve_many([surfaces[0]], sparing=True, workers=0)
     for found in (result, item.result):
         assert same(cold, found)

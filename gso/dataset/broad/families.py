@@ -2,22 +2,22 @@
 
 A family is a function from a random generator to a surface, which is a function from parameters
 (u, v) in [-1, 1]^2 to points. :data:`FAMILIES` says in which splits of the broad set it stands:
-the families of validation and of the test are not trained on.
+the families of validation and of the test are not trained on. SciPy is imported where a family
+needs it: most sets have no surface of these families.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.interpolate import BSpline, RectBivariateSpline
-from scipy.sparse import coo_array, csc_array
-from scipy.sparse.linalg import splu
 
 from gso.dataset.seeds import RNG
 from gso.typing import Array, Ints
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
 
 #: A surface: points (H, W, 3) at parameters u and v (H, W).
 Surface = Callable[[Array, Array], Array]
@@ -76,6 +76,8 @@ def b_spline(rng: RNG) -> Surface:
     net[..., 2] = _amplitude(rng, 0.1, 1.2) * min(sides) * rng.uniform(-1.0, 1.0, counts)
 
     def surface(u: Array, v: Array) -> Array:
+        from scipy.interpolate import BSpline
+
         along, across = (
             BSpline.design_matrix(np.clip(t.ravel(), -1.0, 1.0), k, d).tocsr()
             for t, k, d in zip((u, v), knots, degrees, strict=True)
@@ -204,6 +206,8 @@ def minimal(rng: RNG) -> Surface:
 
 def constant_mean_curvature(rng: RNG) -> Surface:
     """Draw a sector of an unduloid, a surface of revolution of constant mean curvature."""
+    from scipy.integrate import solve_ivp
+
     neck = rng.uniform(0.15, 0.9)
     # Mean curvature 1/2: the meridian's curvature and that of the parallels add to 1, and the
     # radius is between the neck's and 2 minus that.
@@ -230,6 +234,9 @@ def constant_mean_curvature(rng: RNG) -> Surface:
 
 def grid_shell(rng: RNG) -> Surface:
     """Draw a shell in equilibrium under a load, by the force density method (Schek 1974)."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
     n, sides = _SHELL, _sides(rng)
     i, j = np.meshgrid(*(np.linspace(-1.0, 1.0, n),) * 2, indexing="ij")
     bow = rng.uniform(-0.25, 0.25, 4)
@@ -277,6 +284,8 @@ def _supports(rng: RNG, n: int) -> Ints:
 
 
 def _laplacian(edges: Ints, weight: Array, count: int) -> csc_array:
+    from scipy.sparse import coo_array, csc_array
+
     i, j = edges.T
     rows, columns = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
     values = np.concatenate([weight, weight, -weight, -weight])
@@ -291,6 +300,8 @@ def _graph(height: Array, sides: tuple[float, float]) -> Surface:
 
 def _grid(points: Array) -> Surface:
     """Return the surface of a grid of points, interpolated by cubic splines."""
+    from scipy.interpolate import RectBivariateSpline
+
     h, w = points.shape[:2]
     at = np.linspace(-1.0, 1.0, h), np.linspace(-1.0, 1.0, w)
     parts = [RectBivariateSpline(*at, points[..., k]) for k in range(3)]
