@@ -121,7 +121,6 @@ def select(
         numbers = np.arange(start, start + _BLOCK)
         points = sample_many([surface(seed, int(k)) for k in numbers], SIZE)
         good = np.flatnonzero(sound(points))
-        good = good[_may_have_room(points[good], room)]
         cell = _cell(features(points[good]), strata)
         taken = _rank(cell) < room[cell]
         room -= np.bincount(cell[taken], minlength=len(room))
@@ -208,21 +207,6 @@ def _cell(values: Array, strata: str) -> Ints:
     out = np.where(s > SHAPE[-1], first + HARD.index("uneven"), out)
     out = np.where(k > CURVATURE[-1], first + HARD.index("curved"), out)
     return np.where(k > CURVED, first + HARD.index("wild"), out)
-
-
-def _may_have_room(points: Array, room: Ints) -> Flags:
-    """Tell for which grids (b, H, W, 3) some cell of their sigma^2 has room.
-
-    Curvature takes far longer to compute than sigma^2. Most cells are full long before the last
-    one is, and the draws that belong to full ones need no curvature.
-    """
-    main, hard = room[: -len(HARD)], dict(zip(HARD, room[-len(HARD) :], strict=True))
-    if hard["curved"] or hard["wild"]:  # of any sigma^2
-        return np.ones(len(points), bool)
-    values = np.array([boundary_length_variance(p) for p in points])
-    by_shape = main.reshape(len(CURVATURE_SHARES), len(SHAPE_SHARES), -1).any(axis=(0, 2))
-    column = np.searchsorted(SHAPE[1:-1], values)
-    return np.where(values > SHAPE[-1], hard["uneven"] > 0, by_shape[column])
 
 
 def _rank(cell: Ints) -> Ints:
