@@ -162,6 +162,7 @@ def _graph(net: Net, inputs: list[str], outputs: list[str], passes: int) -> byte
                 custom_translation_table=_operators(),
                 dynamo=True,
                 verbose=False,
+                optimize=False,  # The runtime does that itself when it loads the file.
             )
         # The exporter's errors have no class in common but Exception.
         except Exception as error:
