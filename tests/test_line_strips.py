@@ -9,7 +9,6 @@ import pytest
 
 import gso
 from gso.mesh import Mesh
-from gso.ruled import lines
 from gso.ruled.lines import LineStrips, families
 from gso.ruled.solve import Wanted
 
@@ -376,10 +375,19 @@ def test_outlines_that_have_no_corners_or_many():
     assert gso.strips(stairs(), strips=8).metrics["distance_max"] < 1.0
 
 
+def notched():
+    """Triangles of a tube without two of its last ring."""
+    tube = revolved(rows=6, around=24)
+    middle = tube.vertices[tube.faces].mean(axis=1)
+    last = middle[:, 2] > middle[:, 2].max() - 1e-6
+    faces = np.delete(tube.faces, np.flatnonzero(last)[0], axis=0)
+    return Mesh(tube.vertices, Mesh(tube.vertices, faces).triangles)
+
+
 def test_grids_laid_over_corners_have_no_points_that_coincide():
-    # Both edges of a triangle at a corner may lie on one side of a grid.
-    for mesh in (scaled(gso.as_mesh(dome(11))), scaled(stairs(15))):
-        copies = lines.grid_copies(mesh)
+    # Both edges of a triangle at a corner may lie on one side of a grid, or on an end of a tube.
+    for mesh in (scaled(gso.as_mesh(dome(11))), scaled(stairs(15)), scaled(notched())):
+        copies = gso.ruled.lines.grid_copies(mesh)
         assert copies
         for copy in copies:
             ends = copy.vertices[copy.edges]

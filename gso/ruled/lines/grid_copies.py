@@ -171,7 +171,7 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
 
     def outline(number: int, share: Array) -> Array:
         at = along[start[number]] + share * side[number]
-        return np.stack([np.interp(at, along, ring[:, k]) for k in range(3)], axis=1)
+        return np.stack([np.interp(at, along, c) for c in ring.T], axis=1)
 
     def placed(one: Array, two: Array) -> Array:
         points = _placed(mesh.vertices, mesh.triangles, image, one, two)
@@ -213,7 +213,13 @@ def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
     begin = float(image.flat[:, 0].min())
 
     def placed(one: Array, two: Array) -> Array:
-        return _placed(vertices, triangles, every, begin + one, two)
+        points = _placed(vertices, triangles, every, begin + one, two)
+        # Triangles with two edges on an end of the tube have no area in the image.
+        for loop in mesh.boundary_loops:
+            x, y = image.flat[loop].T
+            own = [np.interp(begin + one, x, c, period=wide) for c in mesh.vertices[loop].T]
+            points[:, -1 if y.mean() > 0.5 * high else 0] = np.stack(own, axis=1)
+        return points
 
     even = [np.linspace(0.0, x, _FINE) for x in (wide, high)]
     fine = placed(*even)

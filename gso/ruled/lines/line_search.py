@@ -170,8 +170,9 @@ class LineStrips:
             ended.
         """
         choice = self.choices[number].narrower(widest)
-        rows = choice.rows if most is None else min(most, choice.rows)
-        every = (choice.lines(count) for count in range(1, 1 if self.stopped else rows + 1))
+        rows = 0 if self.stopped else choice.rows
+        counts = range(1, 1 + (rows if most is None else min(most, rows)))
+        every = (choice.lines(count) for count in counts)
         lines = next((found[0] for found in every if found is not None and found[1] <= aim), None)
         tried = [] if lines is None else self._settled(choice, lines, np.inf)
         best = min(tried, key=lambda found: found.order, default=None)
