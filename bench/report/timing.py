@@ -143,11 +143,11 @@ def _measured(
     task: str, method: str, model: str, size: int, repeats: int, *, apart: bool
 ) -> dict[str, Any]:
     asked = {"task": task, "method": method, "model": model, "size": size} | _limits(repeats)
-    command = [sys.executable, str(_SCRIPT), json.dumps(asked)]
-    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     with kernels.chosen(_choice(method)):
         if not apart:
             return quietly(measure.main, **asked)
+        command = [sys.executable, str(_SCRIPT), json.dumps(asked)]
+        one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **one})
     if done.returncode:
         return {"absent": f"failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}"}

@@ -173,9 +173,8 @@ class StripsTask:
 
         Many along lines are far nearer, unless they are fewer than asked for: more were no nearer.
         """
-        number = self.request.options.number
-        many = number is not None and number >= _MANY and one.strips >= number
-        return one.is_close or (many and one.holds)
+        number = self.request.options.number or 0
+        return one.is_close or (self._many and one.holds and one.strips >= number)
 
     @property
     def _counted(self) -> bool:
@@ -269,8 +268,8 @@ class StripsTask:
         def narrow(widest: float, most: int | None) -> Result | None:
             more = max(int(np.ceil(count * longest / widest)), count + 1)
             # Strips with flat regions between them may be one part.
-            few = asked.options.max_strips if most is None or asked.options.flats else most
-            if more > min(few, asked.options.max_strips):
+            limited = most is not None and not asked.options.flats and more > most
+            if limited or more > asked.options.max_strips:
                 return None
             return made(replace(asked.options, strips=more))
 
