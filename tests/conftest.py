@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 
 import numpy as np
@@ -11,6 +12,9 @@ from gso.dataset import generate
 from gso.mesh import Mesh, topology
 from gso.mesh.topology import reverse
 from gso.verdict import Code, Reason
+
+#: Whether every case of tests that have very many of one kind is wanted, not a sample of them.
+EXHAUSTIVE = bool(os.environ.get("GSO_EXHAUSTIVE"))
 
 
 def is_disk(mesh: Mesh) -> bool:

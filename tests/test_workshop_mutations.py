@@ -1,4 +1,7 @@
-"""Damaged small designs through the workshop: only the package's own errors come out."""
+"""Damaged small designs through the workshop: only the package's own errors come out.
+
+With ``GSO_EXHAUSTIVE=1`` in the environment there are five times as many.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,10 @@ import pytest
 import gso
 from gso import GSOError
 from gso.workshop import Finish, Thickness
+from tests.conftest import EXHAUSTIVE
 
 #: Designs of the slow test, and of the fast one; every so many is made of strips.
-FULL, SAMPLE, STRIPS = 300, 12, 100
+FULL, SAMPLE, STRIPS = 300 if EXHAUSTIVE else 60, 12, 50
 
 
 def sheet(kind, rng):

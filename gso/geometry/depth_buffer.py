@@ -128,6 +128,12 @@ def roomiest_pixels(owner: Ints) -> dict[int, Array]:
     room = distance_transform_edt(inside)
     row, column = np.nonzero(owner >= 0)
     number, far = owner[row, column], room[row, column]
-    order = np.lexsort((-far, number))
-    best = order[np.unique(number[order], return_index=True)[1]]
-    return {int(number[k]): np.array([column[k], row[k]]) + 0.5 for k in best}
+    most = np.zeros(owner.max(initial=-1) + 1)
+    np.maximum.at(most, number, far)
+    roomy = np.flatnonzero(far == most[number])
+    known, first = np.unique(number[roomy], return_index=True)
+    best = roomy[first]
+    return {
+        int(k): np.array([j, i]) + 0.5
+        for k, j, i in zip(known, column[best], row[best], strict=True)
+    }

@@ -185,7 +185,8 @@ class Stage:
     @property
     def owner(self) -> Ints:
         """The panel that is seen in each pixel of the image, -1 for none."""
-        return np.where(self._triangle >= 0, self._owner[self._triangle], -1)
+        owner: Ints = np.append(self._owner, -1)[self._triangle]
+        return owner
 
     def picture(
         self,
@@ -207,14 +208,14 @@ class Stage:
             Seams that are drawn in front of everything, with their numbers where these do not lie
             on each other.
         """
-        shown = self._triangle >= 0
-        image = np.full((*self._depth.shape, 3), 255, np.uint8)
-        seen = self._triangle[shown]
-        tones = np.zeros((len(self._owner), 3), np.uint8)
-        used = np.unique(seen)
+        # The last tone is that of pixels without a triangle, whose number is -1.
+        tones = np.full((len(self._owner) + 1, 3), 255, np.uint8)
+        seen = np.zeros(len(tones), bool)
+        seen[self._triangle] = True
+        used = np.flatnonzero(seen[:-1])
         corners = np.concatenate(self._corners)[used]
         tones[used] = _tones(corners, colours[self._owner[used]], new is None)
-        image[shown] = tones[seen]
+        image = tones[self._triangle]
         panels, owner = self._made.panels, self.owner
         drawn_panels = self._shown if new is None else list(new)
         if new is not None:
@@ -354,13 +355,23 @@ def _borders(owner: Ints) -> Flags:
 
 def _roomiest(owner: Ints, panels: Sequence[int]) -> dict[int, Array]:
     """Return the pixel (column, row) with most room for a name on each panel that is seen."""
-    own = np.where(np.isin(owner, panels), owner, -1)
+    is_named = np.zeros(owner.max(initial=-1) + 2, bool)
+    is_named[[k for k in panels if k < len(is_named) - 1]] = True
+    # Of the last entry are pixels without a panel, whose number is -1.
+    own = np.where(is_named[owner], owner, -1)
     rows, columns = (np.flatnonzero((own >= 0).any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return {}
     low = np.array([columns[0], rows[0]])
     part = own[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return {k: middle + low for k, middle in geometry.roomiest_pixels(part).items()}
+    # Pixels of the picture are fine enough, but for panels that have none.
+    found = geometry.roomiest_pixels(part[::_FINE, ::_FINE])
+    places = {k: _FINE * middle for k, middle in found.items()}
+    thin = set(np.flatnonzero(np.bincount(part[part >= 0]))) - places.keys()
+    if thin:
+        every = geometry.roomiest_pixels(part)
+        places |= {k: every[k] for k in map(int, thin)}
+    return {k: middle + low for k, middle in places.items()}
 
 
 def _middle(line: Array) -> Array:
@@ -450,11 +461,18 @@ def _png(image: np.ndarray) -> bytes:
         return struct.pack(">I", len(data)) + name + data + check
 
     rows, columns = image.shape[:2]
-    code = image.astype(np.int64) @ [1 << 16, 1 << 8, 1]
-    colours, index = np.unique(code, return_inverse=True)
+    red, green, blue = image.reshape(-1, 3).T.astype(np.uint32)
+    code = red << 16 | green << 8 | blue
+    # Neighbours are mostly equal: each run of equal pixels is looked at once.
+    start = np.flatnonzero(np.append(True, code[1:] != code[:-1])[: len(code)])
+    colours, index = np.unique(code[start], return_inverse=True)
     few = len(colours) <= 256
     # Each row begins with the number of its filter, 0 for none.
-    pixels = index.reshape(rows, columns).astype(np.uint8) if few else image.reshape(rows, -1)
+    if few:
+        length = np.diff(np.append(start, len(code)))
+        pixels = np.repeat(index.astype(np.uint8), length).reshape(rows, columns)
+    else:
+        pixels = image.reshape(rows, -1)
     lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
     parts = [(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 3 if few else 2, 0, 0, 0))]
     # White is transparent: what has no face shows the page.
@@ -463,5 +481,5 @@ def _png(image: np.ndarray) -> bytes:
         parts.append((b"tRNS", bytes(0 if c == 0xFFFFFF else 255 for c in colours.tolist())))
     else:
         parts.append((b"tRNS", b"\x00\xff" * 3))
-    parts += [(b"IDAT", zlib.compress(lines, 9)), (b"IEND", b"")]
+    parts += [(b"IDAT", zlib.compress(lines, 7)), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from types import MappingProxyType
 
 import numpy as np
 
@@ -47,7 +49,8 @@ def digest(mesh: Mesh) -> str:
     return out.hexdigest()
 
 
-def versions() -> dict[str, str]:
+@cache
+def versions() -> Mapping[str, str]:
     """Return the versions of Python and of the packages that matter."""
     out = {"python": platform.python_version()}
     for name in _PACKAGES:
@@ -55,7 +58,7 @@ def versions() -> dict[str, str]:
             out[name] = version(name)
         except PackageNotFoundError:
             continue
-    return out
+    return MappingProxyType(out)
 
 
 def design_record(fitted: Fitted, parts: Sequence[Part], copies: Sequence[str]) -> Json:

@@ -428,7 +428,7 @@ def fabricate(
                 "finish": finish.record(),
             }
         ),
-        "versions": versions(),
+        "versions": dict(versions()),
         "designs": records,
         "sheets": [],
         "notes": [*dict.fromkeys(notes), *guide_notes(records, settings)],
