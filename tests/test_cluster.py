@@ -17,12 +17,19 @@ from tests.conftest import saddle
 distributed = pytest.importorskip("distributed")
 
 
-@pytest.fixture
-def cluster():
+@pytest.fixture(scope="module")
+def shared():
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as running:
         yield running
+
+
+@pytest.fixture
+def cluster(shared):
+    """A cluster of two workers: one that a test has killed is there again."""
+    shared.wait_for_workers(2, timeout=60)
+    return shared
 
 
 @pytest.mark.slow

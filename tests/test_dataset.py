@@ -27,7 +27,7 @@ from gso.dataset import INTERVALS, LABELS, LEVELS, Recipe, generate, labels, scr
 from gso.unknowns import tensor_matrix
 
 ROOT = Path(__file__).resolve().parents[1]
-TINY = Recipe(n=64, size=16, extras=False)
+TINY = Recipe(n=30, size=16, extras=False)
 #: As many files, and done in seconds.
 QUICK = replace(TINY, labels=("strain",))
 
@@ -36,6 +36,17 @@ def in_unit_ball(grid):
     """A grid (H, W, 3) moved to its centroid and scaled to radius one."""
     moved = grid - grid.mean(axis=(0, 1))
     return moved / np.linalg.norm(moved, axis=2).max()
+
+
+#: Surfaces in a file, so that the small sets have files like large ones: two of a split.
+LENGTH = 16
+
+
+def build(folder, recipe, **how):
+    """Build a set whose files are short."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gso.dataset.shard.LENGTH", LENGTH)
+        return dataset.build(folder, recipe, **how)
 
 
 def digests(folder):
@@ -50,34 +61,37 @@ def digests(folder):
 @pytest.fixture(scope="session", autouse=True)
 def screened_once():
     """Screening in this process is done once for each set: many tests build the same."""
-    known = cache(screen.select)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "gso.dataset.builder.select",
-            lambda count, hard, *, seed, strata, tick=None: known(
-                count, hard, seed=seed, strata=strata
-            ),
+            lambda count, hard, *, seed, strata, tick=None: select(count, hard, seed, strata),
         )
         yield
 
 
+@cache
+def select(count, hard, seed, strata="curvature"):
+    """Screening that several tests need."""
+    return screen.select(count, hard, seed=seed, strata=strata)
+
+
 @pytest.fixture(scope="session")
 def tiny(tmp_path_factory):
-    """A set of 64 surfaces with all labels."""
-    return dataset.build(tmp_path_factory.mktemp("tiny"), TINY, workers=2)
+    """A set of 30 surfaces with all labels."""
+    return build(tmp_path_factory.mktemp("tiny"), TINY, workers=0)
 
 
 @pytest.fixture(scope="session")
 def quick(tmp_path_factory):
     """An uninterrupted set in one process."""
-    return dataset.build(tmp_path_factory.mktemp("quick"), QUICK, workers=0)
+    return build(tmp_path_factory.mktemp("quick"), QUICK, workers=0)
 
 
 @pytest.fixture(scope="session")
 def batched(tmp_path_factory):
-    """The set of 64 surfaces with labels from batches."""
+    """The set of 30 surfaces with labels from batches."""
     pytest.importorskip("torch")
-    return dataset.build(tmp_path_factory.mktemp("batched"), TINY, device="cpu", workers=0)
+    return build(tmp_path_factory.mktemp("batched"), TINY, device="cpu", workers=0)
 
 
 class TestScreen:
@@ -89,7 +103,7 @@ class TestScreen:
             np.testing.assert_allclose(some[k].sample(64), together[k], atol=1e-6)
 
     def test_intervals_get_their_shares_and_the_mean_is_the_published_one(self):
-        chosen = screen.select(400, 12, seed=5)
+        chosen = select(400, 12, seed=5)
         assert len(np.unique(np.r_[chosen.main, chosen.hard])) == 412
         found = self.features(5, chosen.main)
         assert found["K_A"].mean() == pytest.approx(0.307, abs=0.01)
@@ -104,7 +118,7 @@ class TestScreen:
 
     def test_all_features_of_the_paper_get_their_shares(self):
         count = 200
-        chosen = screen.select(count, 0, seed=5, strata="features")
+        chosen = select(count, 0, seed=5, strata="features")
         found = self.features(5, chosen.main)
         values = np.column_stack([found["K_A"], found["sigma2"], found["K_P"] / found["K_A"]])
         edges = [screen.CURVATURE, screen.SHAPE, screen.BALANCE]
@@ -122,7 +136,7 @@ class TestScreen:
         assert Recipe(strata="features").as_dict()["strata"] == "features"
 
     def test_every_split_has_its_share_of_each_interval(self):
-        chosen = screen.select(400, 0, seed=5)
+        chosen = select(400, 12, seed=5)
         for part in np.split(self.features(5, chosen.main)["K_A"], [320, 360]):
             assert part.mean() == pytest.approx(0.307, abs=0.02)
             counts = np.histogram(part, screen.CURVATURE)[0] / len(part)
@@ -138,7 +152,7 @@ class TestScreen:
         np.testing.assert_allclose(alone[3:5], expected, atol=1e-6)
 
     def test_hard_draws_lie_beyond_the_intervals(self):
-        found = self.features(5, screen.select(10, 12, seed=5).hard)
+        found = self.features(5, select(400, 12, seed=5).hard)
         curved, uneven = found["K_A"] > screen.CURVATURE[-1], found["sigma2"] > screen.SHAPE[-1]
         assert (curved | uneven).all()
         assert np.sum(found["K_A"] > screen.CURVED) == np.sum(~curved) == 4
@@ -152,11 +166,11 @@ class TestScreen:
         assert [sum(s) for s in shares] == pytest.approx([1.0, 1.0, 1.0])
 
     def test_another_seed_gives_other_surfaces(self):
-        one, other = (screen.select(10, 1, seed=s) for s in (1, 2))
+        one, other = (select(10, 1, seed=s) for s in (0, 1))
         assert set(one.main) != set(other.main)
-        assert (screen.surface(1, 0).net.shape, screen.surface(1, 0).net.sum()) != (
-            screen.surface(2, 0).net.shape,
-            screen.surface(2, 0).net.sum(),
+        assert (screen.surface(0, 0).net.shape, screen.surface(0, 0).net.sum()) != (
+            screen.surface(1, 0).net.shape,
+            screen.surface(1, 0).net.sum(),
         )
 
     @staticmethod
@@ -257,7 +271,7 @@ class TestLabels:
         assert item["spline_residual"] == pytest.approx(misfit, abs=1e-6)
 
     def test_storage_changes_no_metric_by_a_thousandth(self):
-        for number in screen.select(10, 1, seed=0).main[:2]:
+        for number in select(10, 1, seed=0).main[:2]:
             grid = screen.surface(0, number).sample(64)
             for kind in LABELS:
                 label = labels.solve(kind, grid)
@@ -289,9 +303,9 @@ class TestLabels:
 
 class TestSet:
     def test_every_surface_is_there_once_with_all_labels(self, tiny):
-        assert [len(s) for s in tiny.values()] == [52, 6, 6, 6]
+        assert [len(s) for s in tiny.values()] == [24, 3, 3, 3]
         ids = np.concatenate([s["id"][:] for s in tiny.values()])
-        assert len(np.unique(ids)) == 70
+        assert len(np.unique(ids)) == 33
         for split in tiny.values():
             assert np.isfinite(split["surface"][:]).all()
             for kind in LABELS:
@@ -302,7 +316,7 @@ class TestSet:
 
     def test_surfaces_come_back_from_the_seed(self, tiny):
         split = tiny["train"]
-        for k in (0, 40):
+        for k in (0, 20):
             made = screen.surface(0, int(split["id"][k])).sample(16)
             np.testing.assert_allclose(split["surface"][k], made, atol=1e-12)
         np.testing.assert_allclose(
@@ -339,12 +353,12 @@ class TestSet:
             name: None if name == "manifest.json" else digest
             for name, digest in digests(tiny.path).items()
         }
-        assert record["summary"]["train"]["count"] == 52
-        assert sum(record["summary"]["train"]["intervals"]["K_A"]) == 52
+        assert record["summary"]["train"]["count"] == 24
+        assert sum(record["summary"]["train"]["intervals"]["K_A"]) == 24
         assert not tiny.damaged()
 
     def test_named_splits_are_built_too(self, tmp_path):
-        data = dataset.build(tmp_path, Recipe(n=10, size=16, labels=()), workers=0)
+        data = build(tmp_path, Recipe(n=10, size=16, labels=()), workers=0)
         assert list(data)[4:] == list(shapes.NAMES)
         np.testing.assert_array_equal(
             data["helicoid"]["surface"][:], shapes.sample("helicoid", seed=0, size=16)
@@ -355,7 +369,7 @@ class TestReading:
     @pytest.mark.parametrize(
         "key",
         [
-            *(0, -1, slice(None), slice(5, 40, 3), [41, 3, 3, -2], np.arange(52) % 5 == 0),
+            *(0, -1, slice(None), slice(5, 22, 3), [21, 3, 3, -2], np.arange(24) % 5 == 0),
             *((slice(2, 4), 0, slice(3)), (7, ..., 1), [], slice(9, 3)),
         ],
         ids=str,
@@ -366,13 +380,13 @@ class TestReading:
 
     def test_an_index_out_of_range_is_refused(self, tiny):
         with pytest.raises(IndexError):
-            tiny["train"]["surface"][52]
+            tiny["train"]["surface"][24]
 
     def test_arrays_can_be_sent_to_other_processes(self, tiny):
         array = tiny["train"]["surface"]
         here, there = multiprocessing.Pipe()
         here.send(array)
-        np.testing.assert_array_equal(there.recv()[[3, 50]], array[[3, 50]])
+        np.testing.assert_array_equal(there.recv()[[3, 22]], array[[3, 22]])
 
     def test_only_what_is_asked_for_is_read(self, tiny, tmp_path, monkeypatch):
         dataset.export(tiny, tmp_path, only=("train",))
@@ -409,7 +423,7 @@ class TestReading:
             assert [tuple(t.shape) for t in batch] == [(4, 3, 16, 16), (4, 2, 16, 16), (4, 16, 16)]
             expected = tiny["train"]["surface"][2].transpose(2, 0, 1)
             np.testing.assert_allclose(batch[0][2], expected, atol=1e-7)
-            assert len(list(data)) == 52
+            assert len(list(data)) == 24
 
     def test_no_set_is_no_set(self, tmp_path):
         with pytest.raises(DatasetError, match="holds no dataset"):
@@ -432,20 +446,20 @@ class TestReading:
         assert data.damaged() == ["train/00001.h5", "test/00000.h5"]
         with pytest.raises(DatasetError, match=r"00001.h5 is missing or damaged.*build"):
             data["train"]["surface"][-1]
-        dataset.build(tmp_path / "set", QUICK, workers=0)
+        build(tmp_path / "set", QUICK, workers=0)
         assert digests(tmp_path / "set") == digests(quick.path)
 
 
 class TestFolders:
     def test_a_set_goes_to_files_and_comes_back(self, tiny, tmp_path):
-        assert dataset.export(tiny, tmp_path, only=("train", "test")) == 58
+        assert dataset.export(tiny, tmp_path, only=("train", "test")) == 27
         again = dataset.open(tmp_path)
-        assert {name: len(split) for name, split in again.items()} == {"test": 6, "train": 52}
+        assert {name: len(split) for name, split in again.items()} == {"test": 3, "train": 24}
         file = np.load(tmp_path / "train" / "00007.npy")
         assert (file.shape, file.dtype) == ((16, 16, 3), np.float64)
         np.testing.assert_array_equal(again["train"]["surface"][:], tiny["train"]["surface"][:])
         found = dataset.summarise(again)["test"]
-        assert found["count"] == 6
+        assert found["count"] == 3
         assert found["labels"] == {}
 
     def test_results_have_the_names_of_the_surfaces(self, tiny, tmp_path):
@@ -455,7 +469,7 @@ class TestFolders:
             p.name for p in (tmp_path / "noisy" / "test").iterdir()
         )
         flat = dataset.open(tmp_path / "flat")
-        assert flat["test"]["surface"].shape == (6, 16, 16, 2)
+        assert flat["test"]["surface"].shape == (3, 16, 16, 2)
         with pytest.raises(DatasetError, match="flat images"):
             dataset.summarise(flat)
 
@@ -495,16 +509,17 @@ class TestFolders:
 
 class TestSurvival:
     def test_more_processes_change_no_byte(self, quick, tmp_path):
-        dataset.build(tmp_path, QUICK, workers=2)
+        build(tmp_path, QUICK, workers=2)
         assert digests(tmp_path) == digests(quick.path)
 
     @pytest.mark.slow
     def test_a_killed_build_goes_on_where_it_was(self, quick, tmp_path):
         psutil = pytest.importorskip("psutil")
         place = tmp_path / "set"
-        options = ["--n", "64", "--size", "16", "--no-extras", "--label", "strain"]
-        command = [sys.executable, "-m", "gso", "dataset", "build", "-o", str(place)]
-        for files in (0, 1, 3):
+        options = ["--n", "30", "--size", "16", "--no-extras", "--label", "strain"]
+        code = f"import gso.dataset.shard as s; s.LENGTH = {LENGTH}; import gso.cli as c; c.main()"
+        command = [sys.executable, "-c", code, "dataset", "build", "-o", str(place)]
+        for files in (0, 1):
             run = subprocess.Popen([*command, *options, "--workers", "2"], stderr=subprocess.PIPE)
             while run.poll() is None and len(list(place.rglob("*.h5"))) < files + 1:
                 if files == 0 and (place / "manifest.json").exists():
@@ -519,11 +534,11 @@ class TestSurvival:
                 dataset.open(place)
         (place / "train" / ".gso-0123456789abcdef.tmp").write_bytes(b"half")
         before = {p: p.stat().st_mtime_ns for p in place.rglob("*.h5")}
-        assert len(before) >= 3
-        data = dataset.build(place, QUICK, workers=1)
+        assert len(before) >= 2
+        data = build(place, QUICK, workers=0)
         assert digests(place) == digests(quick.path)
         assert {p: p.stat().st_mtime_ns for p in before} == before
-        assert len(data["train"]) == 52
+        assert len(data["train"]) == 24
 
     def test_a_killed_worker_is_replaced(self, quick, tmp_path):
         killed = []
@@ -533,7 +548,7 @@ class TestSurvival:
                 killed.append(multiprocessing.active_children()[0].pid)
                 os.kill(killed[0], signal.SIGKILL)
 
-        dataset.build(tmp_path, QUICK, workers=2, tick=kill)
+        build(tmp_path, QUICK, workers=2, tick=kill)
         assert killed
         assert digests(tmp_path) == digests(quick.path)
 
@@ -551,16 +566,16 @@ class TestSurvival:
                     os.kill(killed[0], signal.SIGKILL)
 
             address = cluster.scheduler_address
-            data = dataset.build(tmp_path, QUICK, scheduler=address, tick=kill)
+            data = build(tmp_path, QUICK, scheduler=address, tick=kill)
         assert killed
-        assert len(data["train"]) == 52
+        assert len(data["train"]) == 24
         assert digests(tmp_path) == digests(quick.path)
 
     def test_a_scheduler_that_is_not_there_is_reported(self, tmp_path, monkeypatch):
         pytest.importorskip("distributed")
         monkeypatch.setattr("gso.executors.dask.PATIENCE", 0.5)
         with pytest.raises(DatasetError, match="no Dask scheduler answers at tcp:"):
-            dataset.build(tmp_path, QUICK, scheduler="tcp://127.0.0.1:9")
+            build(tmp_path, QUICK, scheduler="tcp://127.0.0.1:9")
 
     def test_a_full_disk_is_reported_and_loses_nothing(self, quick, tmp_path, monkeypatch):
         sync, calls = os.fsync, []
@@ -572,12 +587,12 @@ class TestSurvival:
             sync(descriptor)
 
         monkeypatch.setattr(os, "fsync", full)
-        with pytest.raises(DatasetError, match=r"No space left.*52 of 70.*nothing of it is lost"):
-            dataset.build(tmp_path, QUICK, workers=0)
+        with pytest.raises(DatasetError, match=r"No space left.*24 of 33.*nothing of it is lost"):
+            build(tmp_path, QUICK, workers=0)
         monkeypatch.undo()
         kept = [p for p in digests(tmp_path) if p.endswith(".h5")]
         assert kept == ["train/00000.h5", "train/00001.h5"]
-        dataset.build(tmp_path, QUICK, workers=0)
+        build(tmp_path, QUICK, workers=0)
         assert digests(tmp_path) == digests(quick.path)
 
     def test_two_builds_do_not_mix(self, quick, tmp_path):
@@ -585,14 +600,14 @@ class TestSurvival:
 
         shutil.copytree(quick.path, tmp_path / "set")
         with pytest.raises(DatasetError, match="seed 0, not 1"):
-            dataset.build(tmp_path / "set", replace(QUICK, seed=1))
+            build(tmp_path / "set", replace(QUICK, seed=1))
         with FileLock(tmp_path / "set" / ".lock"), pytest.raises(DatasetError, match="another"):
-            dataset.build(tmp_path / "set", QUICK)
+            build(tmp_path / "set", QUICK)
         with pytest.raises(DatasetError, match="holds set and no dataset"):
-            dataset.build(tmp_path, QUICK)
+            build(tmp_path, QUICK)
         (tmp_path / "file").write_text("")
         with pytest.raises(DatasetError, match="cannot be made a folder"):
-            dataset.build(tmp_path / "file", QUICK)
+            build(tmp_path / "file", QUICK)
 
     def test_other_versions_do_not_mix(self, quick, tmp_path, monkeypatch):
         shutil.copytree(quick.path, tmp_path / "set")
@@ -601,10 +616,10 @@ class TestSurvival:
             "gso.dataset.builder.versions", lambda device: versions | {"numpy": "0.1"}
         )
         # What is complete stays as it is, whatever is installed now.
-        dataset.build(tmp_path / "set", QUICK)
+        build(tmp_path / "set", QUICK)
         (tmp_path / "set" / "test" / "00000.h5").unlink()
         with pytest.raises(DatasetError, match=r"numpy .* not '0.1'"):
-            dataset.build(tmp_path / "set", QUICK)
+            build(tmp_path / "set", QUICK)
         monkeypatch.undo()
         task = gso.dataset.shard.Task("train", 0, (1,))
         with pytest.raises(DatasetError, match=r"train/00000.h5.*numpy .* instead of 0.1"):
@@ -623,21 +638,25 @@ class TestDevice:
             assert here.arrays.keys() == there.arrays.keys()
             for name, array in there.arrays.items():
                 assert (here[name].shape, here[name].dtype) == (array.shape, array.dtype)
-                if name.startswith(("status", "surface", "features", "id")):
-                    assert (here[name][:] == array[:]).mean() > 0.95
-                else:
-                    # The residual of the spline is zero up to rounding errors.
-                    size = max(np.abs(array[:]).max(), 1e-6)
-                    off = (np.abs(here[name][:] - array[:]) / size).reshape(len(array), -1)
-                    # On a few surfaces the iterations amplify rounding errors.
-                    assert (off.max(axis=1) < 1e-6).mean() > 0.8, name
+        for name in tiny["train"].arrays:
+            here, there = (
+                np.concatenate([s[name][:] for s in d.values()]) for d in (batched, tiny)
+            )
+            if name.startswith(("status", "surface", "features", "id")):
+                assert (here == there).mean() > 0.95
+            else:
+                # The residual of the spline is zero up to rounding errors.
+                size = max(np.abs(there).max(), 1e-6)
+                off = (np.abs(here - there) / size).reshape(len(there), -1)
+                # On a few surfaces the iterations amplify rounding errors.
+                assert (off.max(axis=1) < 1e-6).mean() > 0.8, name
 
     def test_a_build_goes_on_where_it_was(self, batched, tmp_path):
         place = tmp_path / "set"
         shutil.copytree(batched.path, place)
         before = digests(place)
         (place / "test" / "00000.h5").unlink()
-        dataset.build(place, TINY, device="cpu", workers=0)
+        build(place, TINY, device="cpu", workers=0)
         assert digests(place) == before
 
     def test_a_set_goes_on_with_its_device(self, batched, quick, tmp_path):
@@ -646,12 +665,12 @@ class TestDevice:
         lost = place / "test" / "00000.h5"
         content = lost.read_bytes()
         lost.unlink()
-        dataset.build(place, TINY, workers=0)
+        build(place, TINY, workers=0)
         assert lost.read_bytes() == content
         place = tmp_path / "quick"
         shutil.copytree(quick.path, place)
         with pytest.raises(DatasetError, match="begun without --device, not with --device cpu"):
-            dataset.build(place, QUICK, device="cpu", workers=0)
+            build(place, QUICK, device="cpu", workers=0)
 
     def test_labels_from_a_graphics_processor(self, quick, tmp_path, monkeypatch):
         pytest.importorskip("torch")
@@ -665,7 +684,7 @@ class TestDevice:
 
         monkeypatch.setattr(device, "check_device", lambda name: None)
         monkeypatch.setattr(device, "solve", solve)
-        made = dataset.build(tmp_path / "set", QUICK, device="cuda", workers=1)
+        made = build(tmp_path / "set", QUICK, device="cuda", workers=1)
         assert sizes
         assert made.manifest["device"] == "cuda"
         for split, there in quick.items():
@@ -686,7 +705,7 @@ class TestDevice:
         (place / "test" / "00000.h5").unlink()
         monkeypatch.setattr(device, "check_device", refused)
         with pytest.raises(OptionError, match="cannot be used"):
-            dataset.build(place, TINY, workers=0)
+            build(place, TINY, workers=0)
         with pytest.raises(OptionError, match="cannot be used"):
             labels.solve_many("strain", np.zeros((1, 9, 9, 3)), "cuda")
 
@@ -704,7 +723,7 @@ class TestDevice:
         if torch.cuda.is_available():
             pytest.skip("CUDA is there")
         with pytest.raises(OptionError, match="device 'cuda' cannot be used"):
-            dataset.build(tmp_path / "set", QUICK, device="cuda")
+            build(tmp_path / "set", QUICK, device="cuda")
         given = ["dataset", "build", "-o", str(tmp_path / "set"), "--device", "cuda"]
         result = CliRunner().invoke(main, given)
         assert result.exit_code != 0
@@ -716,11 +735,11 @@ class TestReference:
     def test_it_is_added_to_a_set_that_is_there(self, tmp_path):
         place = tmp_path / "set"
         recipe = replace(QUICK, labels=())
-        dataset.build(place, recipe, workers=0)
+        build(place, recipe, workers=0)
         before = digests(place)
-        data = dataset.build(place, recipe, reference=["jiang2020"], workers=0)
-        assert data["test"]["jiang2020"].shape == (6, 16, 16, 3)
-        assert data["test"]["jiang2020_flat"].shape == (6, 16, 16, 2)
+        data = build(place, recipe, reference=["jiang2020"], workers=0)
+        assert data["test"]["jiang2020"].shape == (3, 16, 16, 3)
+        assert data["test"]["jiang2020_flat"].shape == (3, 16, 16, 2)
         found = data["test"].metrics["jiang2020"]
         assert set(found) == set(labels.KINDS["jiang2020"].metrics)
         assert all(np.isfinite(values).all() for values in found.values())
@@ -730,15 +749,15 @@ class TestReference:
         assert {k for k in after if k not in before} == {"test/00000.jiang2020.h5"}
         assert all(after[k] == v for k, v in before.items() if k != "manifest.json")
         # Asked for or not, what is there stays a part of the set.
-        assert "jiang2020" in dataset.build(place, recipe, workers=0)["test"].arrays
-        dataset.build(tmp_path / "once", recipe, reference=["jiang2020"], workers=0)
+        assert "jiang2020" in build(place, recipe, workers=0)["test"].arrays
+        build(tmp_path / "once", recipe, reference=["jiang2020"], workers=0)
         assert digests(tmp_path / "once") == after
 
     def test_unknown_ones_are_refused(self, tmp_path):
         with pytest.raises(OptionError, match="no reference 'wang'"):
-            dataset.build(tmp_path, QUICK, reference=["wang"])
+            build(tmp_path, QUICK, reference=["wang"])
         with pytest.raises(OptionError, match="no split 'torus'"):
-            dataset.build(tmp_path, QUICK, reference=["jiang2020"], reference_splits=["torus"])
+            build(tmp_path, QUICK, reference=["jiang2020"], reference_splits=["torus"])
         assert not list(tmp_path.iterdir())
 
 
@@ -788,7 +807,7 @@ class TestCommands:
         self.run("export", tiny.path, "-o", tmp_path, "--split", "test")
         out = self.run("info", tmp_path)
         assert "a folder of .npy files" in out
-        assert ["test", "6"] in [line.split()[:2] for line in out.splitlines()]
+        assert ["test", "3"] in [line.split()[:2] for line in out.splitlines()]
 
     def test_errors_are_one_line(self, tmp_path):
         done = CliRunner().invoke(main, ["dataset", "info", str(tmp_path)], prog_name="gso")

@@ -145,7 +145,7 @@ def test_same_shape_in_any_unit_turned_and_moved(surfaces, solved):
 
 
 def test_rows_and_columns_can_change_places():
-    points = saddle(24, 40)
+    points = saddle(16, 24)
     a = gso.tno.optimize(points).grid
     b = gso.tno.optimize(points.swapaxes(0, 1)).grid.swapaxes(0, 1)
     # The diagonals of the cells stay where they were, so the two meet exactly.
@@ -159,14 +159,13 @@ def test_any_numbering_gives_the_same_surface(surfaces, solved):
     assert result.metrics["K_A_r"] == pytest.approx(solved(1).metrics["K_A_r"], abs=0.05)
 
 
-@pytest.mark.parametrize("share", [0.0025, 0.01])
-def test_max_deviation_is_kept(surfaces, bounded, share):
-    for number in range(2):
-        mesh = Mesh.from_grid(surfaces[number])
-        bound, result = share * mesh.diagonal, bounded(number, share)
-        far = metrics.surface_distance(mesh, result.mesh)
-        assert max(far.there_max, far.back_max) <= bound * (1 + 1e-6)
-        assert result.metrics["K_A_r_worst"] > 0.05
+@pytest.mark.parametrize(("number", "share"), [(0, 0.0025), (0, 0.01), (1, 0.0025)])
+def test_max_deviation_is_kept(surfaces, bounded, number, share):
+    mesh = Mesh.from_grid(surfaces[number])
+    bound, result = share * mesh.diagonal, bounded(number, share)
+    far = metrics.surface_distance(mesh, result.mesh)
+    assert max(far.there_max, far.back_max) <= bound * (1 + 1e-6)
+    assert result.metrics["K_A_r_worst"] > 0.05
 
 
 def test_a_larger_budget_leaves_less_strain(bounded):

@@ -133,7 +133,8 @@ def test_numpy_does_the_work_where_numba_fails(monkeypatch, caplog):
 
 
 def test_small_meshes_do_not_load_numba():
-    code = "import sys, gso; from tests.test_pieces import dome; gso.tno.optimize(dome(17)); "
+    code = "import sys, numpy as np, gso; u, v = np.mgrid[-1:1:17j, -1:1:17j]; "
+    code += "gso.tno.optimize(np.dstack([u, v, 0.35 * (1 - u * u) * (1 - v * v)])); "
     code += "sys.exit('numba' in sys.modules)"
     environment = {k: v for k, v in os.environ.items() if k != loops.VARIABLE}
     subprocess.run([sys.executable, "-c", code], check=True, env=environment)
@@ -161,19 +162,15 @@ def run(cache, count=1):
 
 
 class TestCache:
-    def test_a_second_process_does_not_compile(self, tmp_path):
-        assert "compiling" in run(tmp_path)[0]
+    def test_processes_can_compile_at_the_same_time_and_later_ones_do_not(self, tmp_path):
+        assert any("compiling" in said for said in run(tmp_path, count=2))
         assert "compiling" not in run(tmp_path)[0]
         folder = tmp_path / "gso" / "kernels"
         assert len(list(folder.glob("kernel_*.py"))) == 1
         assert len(list(folder.glob("__pycache__/*.nbi"))) == 1
+        assert not list(folder.glob("*.tmp"))
         if os.name == "posix":
             assert folder.stat().st_mode & 0o077 == 0
-
-    def test_processes_can_compile_at_the_same_time(self, tmp_path):
-        run(tmp_path, count=2)
-        assert not list((tmp_path / "gso" / "kernels").glob("*.tmp"))
-        run(tmp_path)
 
     @pytest.mark.skipif(os.name != "posix", reason="permissions")
     def test_a_folder_that_others_can_write_to_is_not_used(self, tmp_path):
