@@ -204,7 +204,7 @@ class TestRuns:
 class TestCommand:
     def test_it_writes_a_folder(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
-        gso.save(dome(9, 0.2), "dome.obj")
+        gso.save(dome(7, 0.2), "dome.obj")
         words = "fabricate dome.obj -o out --unit m --max-deviation 0.05 --thickness 2 --workers 0"
         more = "--holes 3 8 --format dxf --layers astm --paper A4"
         done = CliRunner().invoke(main, [*words.split(), *more.split()])
