@@ -16,6 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import designs
 import numpy as np
 from harness import BENCH, axes_of, energy, progress, quietly, tabulate, timed
 from report.store import Store
@@ -338,6 +339,22 @@ def _with_effort(grid: np.ndarray) -> dict[str, float]:
     return row
 
 
+def meshes(data: Path | None = None) -> dict[str, Any]:
+    """Print time and energy on 30 meshes that are no grids, ten of each kind, balanced."""
+    grids = [gso.as_mesh(surface) for surface in first(10, data)]
+    kinds = {
+        "quads with irregular vertices": [design.mesh for design in designs.irregular()],
+        "quads with holes": [design.mesh for design in designs.holes()],
+        "triangles": [gso.Mesh(mesh.vertices, mesh.triangles) for mesh in grids],
+    }
+    rows = {}
+    for name, some in kinds.items():
+        compared(some[:1], CASES["balanced"])  # imports and code generation of the first use
+        rows[name] = costs(compared(progress(some, name), CASES["balanced"]))
+    title = "Meshes that are no grids: CPU time; medians; energies and strains over the cold ones"
+    return tabulate(title, ["meshes"], rows)
+
+
 def elsewhere(n: int = 6, data: Path | None = None, case: str = "") -> dict[str, Any]:
     """Print time and energy from a net's result where hybrid solves start cold, on validation.
 
@@ -394,4 +411,4 @@ def _started_anyway(name: str, grid: np.ndarray) -> dict[str, float]:
     }
 
 
-SECTIONS = (speed, sizes, model, load, guard, anytime, effort, elsewhere)
+SECTIONS = (speed, sizes, meshes, model, load, guard, anytime, effort, elsewhere)
