@@ -13,8 +13,8 @@ from gso import GSOError
 from gso.workshop import Finish, Thickness
 from tests.conftest import EXHAUSTIVE
 
-#: Designs of the slow test, and of the fast one; every so many is made of strips.
-FULL, SAMPLE, STRIPS = 300 if EXHAUSTIVE else 60, 12, 50
+#: Numbers of the slow test's designs, and of the fast one's; every so many is made of strips.
+FULL, SAMPLE, STRIPS = range(0, 300, 1 if EXHAUSTIVE else 5), range(1, 13), 50
 
 
 def sheet(kind, rng):
@@ -118,12 +118,12 @@ def counted(numbers, folder):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_sample_of_damaged_designs_ends_in_parts_or_own_errors(tmp_path):
-    found = counted(range(1, 1 + SAMPLE), tmp_path)
+    found = counted(SAMPLE, tmp_path)
     assert min(found["usable"], found["not usable"] + found["refused"]) >= 1
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_damaged_designs_end_in_parts_or_own_errors(tmp_path):
-    found = counted(range(FULL), tmp_path)
-    assert min(found.values()) > FULL // 30
+    found = counted(FULL, tmp_path)
+    assert min(found.values()) > len(FULL) // 30
