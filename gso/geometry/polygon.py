@@ -67,6 +67,17 @@ def arc_lengths(line: Array) -> Array:
     return np.asarray(np.r_[0.0, np.cumsum(steps)])
 
 
+def points_at(at: Array | float, along: Array, line: Array, period: float | None = None) -> Array:
+    """Interpolate a line (k, d), whose points are at places `along` (k,), at other places.
+
+    Places count modulo `period`, if it is given.
+
+    >>> points_at(2.5, np.array([0.0, 5, 6]), np.array([[0.0, 0], [3, 4], [3, 5]])).tolist()
+    [1.5, 2.0]
+    """
+    return np.stack([np.interp(at, along, x, period=period) for x in line.T], axis=-1)
+
+
 def densified(line: Array, step: float) -> Array:
     """Insert points (n, d) into a line (k, d), so that no two are farther apart than a step.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from gso import geometry
 from gso.errors import MeshError
+from gso.geometry.polygon import points_at
 from gso.linalg import spd
 from gso.mesh import Mesh
 from gso.parametrization.embedding import parts, spanned
@@ -148,7 +149,7 @@ def _boundary(mesh: Mesh) -> tuple[Ints, Array, Array]:
     long = np.diff(along[ends])
     sides = 0.5 * (long[:2] + long[2:])
     corner_at = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
-    at = np.stack([np.interp(along[:-1], along[ends], x) for x in corner_at.T], axis=1)
+    at = points_at(along[:-1], along[ends], corner_at)
     return loop, at * sides, sides
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import MeshError, OptionError
+from gso.geometry.polygon import points_at
 from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest
 from gso.ruled.descent import planarised
@@ -164,7 +165,7 @@ def _first(curves: list[_Curve], rulings: int) -> Array:
     ends = np.stack([np.convolve(x, np.ones(9) / 9.0, mode="valid") for x in padded.T], axis=1)
     mean = ends.mean(axis=1)
     at = np.linspace(mean[0], mean[-1], rulings)
-    return np.stack([np.interp(at, mean, x) for x in ends.T], axis=1)
+    return points_at(at, mean, ends)
 
 
 def _slid(curves: list[_Curve], at: Array) -> Array:

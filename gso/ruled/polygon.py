@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.geometry.polygon import arc_lengths
+from gso.geometry.polygon import arc_lengths, points_at
 from gso.typing import Array, Ints
 
 #: Turning angles of sharp corners, and the largest for which offsets are lengthened.
@@ -26,7 +26,7 @@ def resampled(loop: Array, count: int) -> tuple[Array, Array]:
             gap = np.abs(at - along[k])
             at[np.minimum(gap, along[-1] - gap).argmin()] = along[k]
     at = np.sort(at)
-    points = np.stack([np.interp(at, along, c) for c in closed.T], axis=1)
+    points = points_at(at, along, closed)
     way = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     normals = np.stack([way[:, 1], -way[:, 0]], axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -51,4 +51,4 @@ def turning(loop: Array) -> Array:
 def on(loop: Array, at: Array) -> Array:
     """Interpolate a closed polygon (n, 2) at numbers of its points, modulo n."""
     n = len(loop)
-    return np.stack([np.interp(at % n, np.arange(n + 1), np.append(c, c[0])) for c in loop.T], 1)
+    return points_at(at, np.arange(n, dtype=float), loop, period=n)

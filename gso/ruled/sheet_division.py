@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gso.geometry.polygon import points_at
 from gso.geometry.vectors import lengths
 from gso.mesh import Mesh, topology
 from gso.mesh.topology import pair_keys
@@ -185,12 +186,9 @@ class _Strips:
         if not at[0] < wanted < at[-1]:
             return None
         ends = flat[self.rulings[hinges]]
-        width = float(np.median(lengths(ends[:, 1] - ends[:, 0])))
-
-        def middle(place: float) -> Array:
-            return np.array([np.interp(place, at, x) for x in ends.mean(axis=1).T])
-
-        way = middle(wanted + 0.5 * width) - middle(wanted - 0.5 * width)
+        width, middle = float(np.median(lengths(ends[:, 1] - ends[:, 0]))), ends.mean(axis=1)
+        begin, end = points_at(wanted + np.array([-0.5, 0.5]) * width, at, middle)
+        way = end - begin
         way = way / max(float(np.hypot(*way)), 1e-300)
         beyond = {
             (min(a, b), max(a, b)): (int(one), int(two))
@@ -201,7 +199,7 @@ class _Strips:
         best, most = None, 0.0
         for shift in width * np.array(_SHIFTS):
             place = float(np.clip(wanted + shift, at[0], at[-1]))
-            off = (flat - middle(place)) @ way
+            off = (flat - points_at(place, at, middle)) @ way
             start = int(path[int(np.searchsorted(at, place))])
             pieces = self._crossed(off, start, beyond)
             clear = min(

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import SubElement
 import numpy as np
 
 from gso import geometry
-from gso.geometry.polygon import arc_lengths
+from gso.geometry.polygon import arc_lengths, points_at
 from gso.mesh import Mesh
 from gso.mesh.view import GRAZING, View, lit, pale_colours
 from gso.typing import Array, Flags, Ints
@@ -377,7 +377,7 @@ def _roomiest(owner: Ints, panels: Sequence[int]) -> dict[int, Array]:
 def _middle(line: Array) -> Array:
     """Return the point half-way along a line (k, 2)."""
     along = arc_lengths(line)
-    return np.array([np.interp(0.5 * along[-1], along, x) for x in line.T])
+    return points_at(0.5 * along[-1], along, line)
 
 
 def short(name: str, design: str) -> str:

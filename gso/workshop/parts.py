@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gso.geometry.polygon import anticlockwise, arc_lengths, rectangle
+from gso.geometry.polygon import anticlockwise, arc_lengths, points_at, rectangle
 from gso.pattern import Bend
 from gso.typing import Array
 from gso.verdict import Reason
@@ -204,7 +204,7 @@ def _tab_seams(
         for (own, here), (other, there) in (seam, seam[::-1]):
             if own == number:
                 at = here.length - here.along
-                line = np.stack([np.interp(at, there.along, c) for c in there.line.T], axis=1)
+                line = points_at(at, there.along, there.line)
                 seam_line = (here.line, line, parts[other])
                 out.append(TabSeam(here.number, *seam_line, here.first, here.angle))
     return out

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gso.geometry.polygon import arc_lengths
+from gso.geometry.polygon import arc_lengths, points_at
 from gso.geometry.steady import steady
 from gso.pattern import Bend
 from gso.typing import Array
@@ -258,7 +258,7 @@ def _inner(line: Array) -> Array:
     """Return the middle half of a line."""
     along = arc_lengths(line)
     at = np.linspace(0.25, 0.75, 5) * along[-1]
-    return np.stack([np.interp(at, along, c) for c in line.T], axis=1)
+    return points_at(at, along, line)
 
 
 def _number(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso import geometry, parametrization
-from gso.geometry.polygon import arc_lengths, signed_area
+from gso.geometry.polygon import arc_lengths, points_at, signed_area
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, Nearest, vertex_normals
 from gso.mesh.polyline import turns
@@ -171,7 +171,7 @@ def _grid(mesh: Mesh, loop: Ints, turn: Array, corners: Ints) -> Mesh:
 
     def outline(number: int, share: Array) -> Array:
         at = along[start[number]] + share * side[number]
-        return np.stack([np.interp(at, along, c) for c in ring.T], axis=1)
+        return points_at(at, along, ring)
 
     def placed(one: Array, two: Array) -> Array:
         points = _placed(mesh.vertices, mesh.triangles, image, one, two)
@@ -217,8 +217,8 @@ def _closed(mesh: Mesh, image: parametrization.Around) -> Mesh:
         # Triangles with two edges on an end of the tube have no area in the image.
         for loop in mesh.boundary_loops:
             x, y = image.flat[loop].T
-            own = [np.interp(begin + one, x, c, period=wide) for c in mesh.vertices[loop].T]
-            points[:, -1 if y.mean() > 0.5 * high else 0] = np.stack(own, axis=1)
+            own = points_at(begin + one, x, mesh.vertices[loop], period=wide)
+            points[:, -1 if y.mean() > 0.5 * high else 0] = own
         return points
 
     even = [np.linspace(0.0, x, _FINE) for x in (wide, high)]

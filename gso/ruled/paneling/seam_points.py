@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gso.cut_pieces import Pieces
+from gso.geometry.polygon import arc_lengths, points_at
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import vertex_normals
 from gso.mesh.polyline import turns
@@ -92,13 +93,13 @@ def _spaced(points: Array, normals: Array | None, step: float, within: float) ->
 
     With normals of the surface the curve may be farther from the chords along the surface.
     """
-    at = np.r_[0.0, np.cumsum(lengths(np.diff(points, axis=0)))]
+    at = arc_lengths(points)
     closed = bool((points[0] == points[-1]).all())
     count = max(int(np.ceil(at[-1] / step)), _CLOSED if closed else 1)
     while True:
         places = np.linspace(0.0, at[-1], count + 1)
         chosen = np.unique(np.abs(at[:, None] - places).argmin(axis=0))
-        chord = np.stack([np.interp(at, at[chosen], x) for x in points[chosen].T], axis=1)
+        chord = points_at(at, at[chosen], points[chosen])
         off = chord - points
         far = lengths(off)
         if normals is not None:
