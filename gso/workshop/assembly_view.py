@@ -355,10 +355,7 @@ def _borders(owner: Ints) -> Flags:
 
 def _roomiest(owner: Ints, panels: Sequence[int]) -> dict[int, Array]:
     """Return the pixel (column, row) with most room for a name on each panel that is seen."""
-    is_named = np.zeros(owner.max(initial=-1) + 2, bool)
-    is_named[[k for k in panels if k < len(is_named) - 1]] = True
-    # Of the last entry are pixels without a panel, whose number is -1.
-    own = np.where(is_named[owner], owner, -1)
+    own = np.where(np.isin(owner, panels), owner, -1)
     rows, columns = (np.flatnonzero((own >= 0).any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return {}
