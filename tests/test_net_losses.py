@@ -128,6 +128,18 @@ def test_iso_and_the_metric():
     assert float(training_losses.iso(batch(bent), batch(bent))) == 0.0
 
 
+def test_the_strain_is_that_of_the_metric():
+    surface = saddle(9, 8)
+    flat = parametrization.rectangle(surface)
+    mean = float(training_losses.strain(batch(surface), batch(flat)))
+    assert mean == pytest.approx(metrics.principal_strains(surface, flat).mean, rel=1e-6)
+    plane = np.dstack([*np.mgrid[:5.0, :4.0], np.zeros((5, 4))])
+    still = batch(plane[..., :2]).requires_grad_()
+    none = training_losses.strain(batch(plane), still)
+    none.sum().backward()
+    assert 0.0 <= float(none.detach()) <= 2e-6 and still.grad.isfinite().all()
+
+
 def test_curvature_weights():
     surface = saddle(9, 8)
     weights = training_losses.iso_weights(batch(surface))[0].numpy()

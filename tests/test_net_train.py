@@ -269,7 +269,7 @@ def test_every_term_of_a_configuration_is_a_loss():
     assert len(terms) > 5
     designs = normalise(torch.rand(2, 16, 8, 3))
     for name in terms:
-        net = restless("flatten" if name.startswith("iso") else "developable")
+        net = restless("flatten" if name.startswith(("iso", "strain")) else "developable")
         one, two = (
             loss_of(net, Batch(designs, designs), Phase(weights={name: w}), 0.0) for w in (1, 2)
         )

@@ -43,7 +43,7 @@ TASK = NetTask(
     default="flatten-strain",
     score="strain_mean",
     figures=figures,
-    terms=("fair", "iso", "iso_w", "iso_cell", "iso_cell_w", "label"),
+    terms=("fair", "iso", "iso_w", "iso_cell", "iso_cell_w", "strain", "label"),
     energy=energy,
     displacement=0.03,
     # The optimiser's own start is within a few iterations of the minimum.

@@ -28,7 +28,7 @@ LARGEST_STRIDE = 4
 #: All terms of the loss "published": published losses, metrics of results, and the label.
 TERMS = (
     *("in", "fair", "gc", "loss_gc", "k_left", "d_h", "fair_ratio"),
-    *("iso", "iso_w", "iso_cell", "iso_cell_w", "label"),
+    *("iso", "iso_w", "iso_cell", "iso_cell_w", "strain", "label"),
 )
 
 

@@ -84,6 +84,7 @@ _TERMS: dict[str, Term] = {
     "iso_w": _weighted(training_losses.iso),
     "iso_cell": lambda flat, surface: training_losses.iso_cell(surface, flat),
     "iso_cell_w": _weighted(training_losses.iso_cell),
+    "strain": lambda flat, surface: training_losses.strain(surface, flat),
 }
 
 

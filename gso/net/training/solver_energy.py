@@ -25,6 +25,8 @@ from gso.tasks.developable.objective import adapted_weights
 LEAST_CURVATURE = 1e-3
 #: Lower bound on the typical strain of a flat image, by which its energy is divided.
 _LEAST_STRAIN = 1e-3
+#: Shear that is added, in squares, to that of each corner.
+_LEAST_SHEAR = 1e-6
 
 
 @dataclass(eq=False)
@@ -182,6 +184,14 @@ class Strain:
         r = torch.stack(stretch.residual(geometry.cell_corners(planes(flat)), self.rest))
         good = torch.stack(self.sound)
         return torch.where(good.repeat(3, 1, 1, 1), r, torch.zeros_like(r))
+
+    def mean(self, flat: Tensor) -> Tensor:
+        """Compute the mean (B,) of the larger principal strain of the corners: ``strain_mean``."""
+        scale, c, d = (r / 2.0**0.5 for r in self.residuals(flat).chunk(3))
+        # Where there is no shear, its root has no derivative.
+        larger = scale.abs() + (c.square() + d.square() + _LEAST_SHEAR**2).sqrt()
+        good = torch.stack(self.sound)
+        return (larger * good).sum(dim=(0, 2, 3)) / good.sum(dim=(0, 2, 3))
 
     def level(self, r: Tensor) -> Tensor:
         """Compute the root-mean-square strain (B,) from residuals."""

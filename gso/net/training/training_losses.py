@@ -13,7 +13,8 @@ from torch.nn.functional import pad
 from gso import geometry
 from gso.net.models import grid_geometry
 from gso.net.models.grid_geometry import Planes, planes
-from gso.net.training.solver_energy import LEAST_CURVATURE
+from gso.net.training.solver_energy import LEAST_CURVATURE, Strain
+from gso.tasks import flatten
 
 #: Search radius for the nearest vertex, in steps along the grid.
 _REACH = 2
@@ -111,6 +112,11 @@ def iso_cell(surface: Tensor, flat: Tensor, weights: Tensor | None = None) -> Te
     `weights` are those of :func:`iso`.
     """
     return _over_cells(_defects(surface, flat).abs(), weights)
+
+
+def strain(surface: Tensor, flat: Tensor) -> Tensor:
+    """Compute ``strain``, the mean of the larger principal strain (``strain_mean``)."""
+    return Strain(surface, flatten.Options()).mean(flat)
 
 
 def _defects(surface: Tensor, flat: Tensor) -> Tensor:
