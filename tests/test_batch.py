@@ -329,7 +329,7 @@ def test_other_unknowns_and_methods(designs):
         gso.DevelopableOptions(method="gauss-newton"),
         gso.DevelopableOptions(iterations=0, coarse_iterations=1),
     ):
-        some = designs[:2, ::2, ::2]
+        some = designs[:2]
         found = energies(gso.tno.optimize_batch(some, options=options, workers=0))
         wanted = energies([gso.tno.optimize(p, options=options, verdict=False) for p in some])
         np.testing.assert_allclose(found, wanted, rtol=1e-5)

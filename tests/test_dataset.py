@@ -649,7 +649,10 @@ class TestDevice:
                 size = max(np.abs(there).max(), 1e-6)
                 off = (np.abs(here - there) / size).reshape(len(there), -1)
                 # On a few surfaces the iterations amplify rounding errors.
-                assert (off.max(axis=1) < 1e-6).mean() > 0.8, name
+                equal = off.max(axis=1) < 1e-6
+                assert equal.mean() > 0.8, name
+                parts = np.split(equal, np.cumsum([len(s) for s in tiny.values()])[:-1])
+                assert all(part.any() for part in parts), name
 
     def test_a_build_goes_on_where_it_was(self, batched, tmp_path):
         place = tmp_path / "set"

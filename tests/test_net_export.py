@@ -310,7 +310,8 @@ except gso.BackendError as error:
     assert 'pip install ".[onnx]"' in run_without("onnxruntime", code, tmp_path)
 
 
-#: One of each kind, task and number of passes; and, if every case is wanted, all others.
+#: Nets of the package that are exported. Their kinds and tasks, with those of the small nets above,
+#: are those of all nets.
 PACKAGED = ["net-cf", "developable", "flatten-strain", "flatten-w"]
 
 

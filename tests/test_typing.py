@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_mypy_checks_a_file_of_a_user_strictly():
+def test_the_configuration_of_mypy_includes_the_file_of_a_user():
     config = ConfigParser()
     config.read(ROOT / "setup.cfg")
     checked = config["mypy"]

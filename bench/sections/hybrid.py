@@ -344,7 +344,7 @@ def meshes(data: Path | None = None) -> dict[str, Any]:
     grids = [gso.as_mesh(surface) for surface in first(10, data)]
     kinds = {
         "quads with irregular vertices": [design.mesh for design in designs.irregular()],
-        "quads with holes": [design.mesh for design in designs.holes()],
+        "with holes": [design.mesh for design in designs.holes()],
         "triangles": [gso.Mesh(mesh.vertices, mesh.triangles) for mesh in grids],
     }
     rows = {}

@@ -361,14 +361,7 @@ def _roomiest(owner: Ints, panels: Sequence[int]) -> dict[int, Array]:
         return {}
     low = np.array([columns[0], rows[0]])
     part = own[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    # Pixels of the picture are fine enough, but for panels that have none.
-    found = geometry.roomiest_pixels(part[::_FINE, ::_FINE])
-    places = {k: _FINE * middle for k, middle in found.items()}
-    thin = set(np.flatnonzero(np.bincount(part[part >= 0]))) - places.keys()
-    if thin:
-        every = geometry.roomiest_pixels(part)
-        places |= {k: every[k] for k in map(int, thin)}
-    return {k: middle + low for k, middle in places.items()}
+    return {k: middle + low for k, middle in geometry.roomiest_pixels(part, _FINE).items()}
 
 
 def _middle(line: Array) -> Array:
