@@ -191,7 +191,8 @@ class Strain:
         # Where there is no shear, its root has no derivative.
         larger = scale.abs() + (c.square() + d.square() + _LEAST_SHEAR**2).sqrt()
         good = torch.stack(self.sound)
-        return (larger * good).sum(dim=(0, 2, 3)) / good.sum(dim=(0, 2, 3))
+        mean: Tensor = (larger * good).sum(dim=(0, 2, 3)) / good.sum(dim=(0, 2, 3))
+        return mean
 
     def level(self, r: Tensor) -> Tensor:
         """Compute the root-mean-square strain (B,) from residuals."""
