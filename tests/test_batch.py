@@ -323,13 +323,13 @@ def test_other_shapes_of_grids(height, width):
 
 
 def test_other_unknowns_and_methods(designs):
+    some = designs[:2]
     for options in (
         gso.DevelopableOptions(variables="spline"),
         gso.DevelopableOptions(variables="surface"),
         gso.DevelopableOptions(method="gauss-newton"),
         gso.DevelopableOptions(iterations=0, coarse_iterations=1),
     ):
-        some = designs[:2]
         found = energies(gso.tno.optimize_batch(some, options=options, workers=0))
         wanted = energies([gso.tno.optimize(p, options=options, verdict=False) for p in some])
         np.testing.assert_allclose(found, wanted, rtol=1e-5)

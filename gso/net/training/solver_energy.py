@@ -25,7 +25,7 @@ from gso.tasks.developable.objective import adapted_weights
 LEAST_CURVATURE = 1e-3
 #: Lower bound on the typical strain of a flat image, by which its energy is divided.
 _LEAST_STRAIN = 1e-3
-#: Shear that is added, in squares, to that of each corner.
+#: Shear of a corner without any: the root of its squares has no derivative at zero.
 _LEAST_SHEAR = 1e-6
 
 
@@ -168,35 +168,33 @@ class Strain:
     def __post_init__(self) -> None:
         p = planes(self.surface)
         cell = geometry.cell_corners(p)
-        rest, self.sound = [], []
+        rest, sound = [], []
         for a, b, c in stretch.corners_of(4):
             frame = geometry.rest_frame(cell[a], cell[b], cell[c])
             e, f = geometry.sub(cell[b], cell[a]), geometry.sub(cell[c], cell[a])
             area = geometry.norm(geometry.cross(e, f))
             good = area > stretch.FLAT_CORNER * (geometry.norm2(e) + geometry.norm2(f))
             rest += [torch.where(good, x, torch.zeros_like(x)) for x in frame]
-            self.sound.append(good)
-        self.rest = rest
+            sound.append(good)
+        self.rest, self.sound = rest, torch.stack(sound)
         self.lengths = [1.0 / geometry.norm(d).clamp_min(1e-9) for d in _edges(p)]
 
     def residuals(self, flat: Tensor) -> Tensor:
         """Compute strain residuals (12, B, H-1, W-1); see :func:`gso.energy.stretch.residual`."""
         r = torch.stack(stretch.residual(geometry.cell_corners(planes(flat)), self.rest))
-        good = torch.stack(self.sound)
-        return torch.where(good.repeat(3, 1, 1, 1), r, torch.zeros_like(r))
+        return torch.where(self.sound.repeat(3, 1, 1, 1), r, torch.zeros_like(r))
 
     def mean(self, flat: Tensor) -> Tensor:
         """Compute the mean (B,) of the larger principal strain of the corners: ``strain_mean``."""
         scale, c, d = (r / 2.0**0.5 for r in self.residuals(flat).chunk(3))
-        # Where there is no shear, its root has no derivative.
         larger = scale.abs() + (c.square() + d.square() + _LEAST_SHEAR**2).sqrt()
-        good = torch.stack(self.sound)
-        mean: Tensor = (larger * good).sum(dim=(0, 2, 3)) / good.sum(dim=(0, 2, 3))
+        total = (larger * self.sound).sum(dim=(0, 2, 3))
+        mean: Tensor = total / self.sound.sum(dim=(0, 2, 3))
         return mean
 
     def level(self, r: Tensor) -> Tensor:
         """Compute the root-mean-square strain (B,) from residuals."""
-        squares = r.square().sum(dim=(0, 2, 3)) / torch.stack(self.sound).sum(dim=(0, 2, 3))
+        squares = r.square().sum(dim=(0, 2, 3)) / self.sound.sum(dim=(0, 2, 3))
         return (0.5 * squares).sqrt()
 
     def __call__(self, flat: Tensor) -> Tensor:
