@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import subprocess
 import sys
@@ -31,7 +32,7 @@ from gso.net import (  # noqa: E402
     save,
     tasks,
 )
-from gso.net.models import axes  # noqa: E402
+from gso.net.models import Convolution, axes  # noqa: E402
 from gso.net.models.blocks import IMDB, Stencils  # noqa: E402
 
 #: Random nets do harm: the results of most tests are those without a guard.
@@ -181,6 +182,36 @@ def test_stencils_take_the_weights_of_a_net_without():
     two.copy_weights_from(GSONet(channels=4, blocks=1, stencils=True))
     with pytest.raises(RuntimeError, match="size"):
         two.copy_weights_from(GSONet(channels=8, blocks=1))
+
+
+@pytest.mark.parametrize("kernel, stride, bias", [(3, 1, True), (2, 2, False), (1, 1, False)])
+@pytest.mark.parametrize("count", [1, 3])
+def test_convolutions_with_reordered_weights_are_convolutions(kernel, stride, bias, count):
+    torch.manual_seed(0)
+    layer = Convolution(12, 20, kernel, stride=stride, padding=kernel // 2, bias=bias)
+    x = torch.randn(count, 12, 8, 10)
+    wide = torch.randn(count, 16, 8, 10)[:, 4:]
+
+    def agrees(layer):
+        with torch.inference_mode():
+            for seen in (x, x.contiguous(memory_format=torch.channels_last), wide):
+                expected = torch.nn.Conv2d.forward(layer, seen)
+                assert (layer(seen) - expected).abs().max() < 1e-5 * expected.abs().max()
+        return True
+
+    assert agrees(layer)
+    assert agrees(copy.deepcopy(layer))
+    with torch.no_grad():
+        layer.weight.mul_(2.0)
+    assert agrees(layer)
+    layer.load_state_dict(Convolution(12, 20, kernel, bias=bias).state_dict())
+    assert agrees(layer)
+    layer.weight = torch.nn.Parameter(torch.randn_like(layer.weight))
+    assert agrees(layer)
+    layer.to(torch.float64).to(torch.float32)
+    assert agrees(layer)
+    layer(x).sum().backward()
+    assert layer.weight.grad.abs().sum() > 0
 
 
 def test_published_net_has_no_biases():

@@ -10,6 +10,8 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+import time
+from functools import partial
 from itertools import groupby, product
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from typing import Any
 import numpy as np
 from harness import axes_of, progress, tabulate, timed
 from report.published import NETS, TABLE_3
+from scipy.linalg import cholesky_banded
 
 from gso import dataset, net
 from gso.cli.progress import share
@@ -225,4 +228,32 @@ def _trained(blocks: int, channels: int, stride: int, data: Path, folder: Path) 
     return {"blocks": blocks, "channels": channels, **row}
 
 
-SECTIONS = (rows, cards, rounding, curve, grid)
+def cost(n: int = 40) -> dict[str, Any]:
+    """Print the CPU time of a prediction beside that of one banded Cholesky factorisation.
+
+    The matrix has the size and the bandwidth of a Gauss-Newton step of the surface, 64 x 64
+    vertices row by row. All are computed `n` times, in turn. Use OMP_NUM_THREADS=1.
+    """
+    x, y = np.mgrid[-1:1:64j, -1:1:64j]
+    surface = np.dstack([x, y, 0.2 * x * y + 0.1 * np.sin(2.0 * x)])
+    band = 3 * (len(surface) + 1)
+    matrix = np.random.default_rng(0).normal(0.0, 0.01, (band + 1, surface.size))
+    matrix[0] = 10.0
+    ways = {"Cholesky factorisation": partial(cholesky_banded, matrix, lower=True)}
+    for name in net.available():
+        task = catalogue.read_card(catalogue.located(catalogue.parts(name)[0]))["model"]["task"]
+        ways[name] = partial(net.predict, surface, task=task, model=name)
+    ways["developable, one pass"] = partial(net.predict, surface, passes=1)
+    spent = {name: np.empty(n) for name in ways}
+    for k in range(-1, n):
+        for name, way in ways.items():
+            clock = time.process_time()
+            way()
+            spent[name][k] = time.process_time() - clock
+    middle = {name: float(np.median(s)) for name, s in spent.items()}
+    whole = middle["Cholesky factorisation"]
+    rows = {name: {"ms": 1e3 * s, "ratio": s / whole} for name, s in middle.items()}
+    return tabulate(f"CPU time; {surface.size} unknowns, bandwidth {band}", ["what"], rows)
+
+
+SECTIONS = (rows, cards, cost, rounding, curve, grid)

@@ -6,6 +6,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
 
+from gso.net.models.convolution import Convolution
+
 #: Channels per group of the group normalisation.
 _GROUP = 16
 #: Slope of the LeakyReLU for negative numbers.
@@ -92,10 +94,10 @@ class IMDB(nn.Module):
         kept, rest = channels // 4, channels - channels // 4
         self.sizes = (kept, rest)
         self.steps = nn.ModuleList(
-            nn.Conv2d(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
+            Convolution(n, channels, 3, padding=1, bias=False) for n in (channels, rest, rest)
         )
-        self.last = nn.Conv2d(rest, kept, 3, padding=1, bias=False)
-        self.mix = nn.Conv2d(channels, channels, 1, bias=False)
+        self.last = Convolution(rest, kept, 3, padding=1, bias=False)
+        self.mix = Convolution(channels, channels, 1, bias=False)
         self.active = nn.LeakyReLU(_LEAK, inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -118,7 +120,7 @@ class Residual(nn.Module):
         super().__init__()
         groups = max(channels // _GROUP, 1)
         self.before, self.between = (nn.GroupNorm(groups, channels) for _ in range(2))
-        self.first, self.second = (nn.Conv2d(channels, channels, 3, padding=1) for _ in range(2))
+        self.first, self.second = (Convolution(channels, channels, 3, padding=1) for _ in range(2))
         self.everywhere = nn.Linear(channels, channels)
 
     def forward(self, x: Tensor) -> Tensor:

@@ -10,6 +10,7 @@ from gso.errors import OptionError
 from gso.net.models import inputs
 from gso.net.models.base import Net
 from gso.net.models.blocks import Residual
+from gso.net.models.convolution import Convolution
 from gso.net.models.grid_geometry import Frame, planes, points
 from gso.net.models.resampling import spline_field
 
@@ -88,20 +89,20 @@ class CoarseNet(Net):
             return nn.Sequential(*(Residual(width) for _ in range(depth)))
 
         seen = inputs.SHAPE + inputs.BENDING + state + dim
-        self.stem = nn.Conv2d(seen, w[0], 4, stride=2, padding=1)
+        self.stem = Convolution(seen, w[0], 4, stride=2, padding=1)
         self.fine_in = blocks(w[0], d[0])
-        self.to_middle = nn.Conv2d(w[0], w[1], 2, stride=2)
+        self.to_middle = Convolution(w[0], w[1], 2, stride=2)
         self.middle_in = blocks(w[1], d[1])
-        self.to_body = nn.Conv2d(w[1], w[2], 2, stride=2)
+        self.to_body = Convolution(w[1], w[2], 2, stride=2)
         self.body = blocks(w[2], d[2])
         self.from_body = nn.Conv2d(w[2], w[1], 1)
         self.middle_out = blocks(w[1], d[1] + 1)
         self.from_middle = nn.Conv2d(w[1], w[0], 1)
         self.fine_out = blocks(w[0], d[0] + 1)
-        self.coarse_head, self.fine_head = (nn.Conv2d(n, dim, 3, padding=1) for n in (w[1], w[0]))
+        self.coarse_head, self.fine_head = (Convolution(n, dim, 3, padding=1) for n in (w[1], w[0]))
         heads = [self.coarse_head, self.fine_head]
         if confidence:
-            self.confidence_head = nn.Conv2d(w[1], 1, 3, padding=1)
+            self.confidence_head = Convolution(w[1], 1, 3, padding=1)
             heads.append(self.confidence_head)
             self.EXPORTED_OUTPUTS = (*self.EXPORTED_OUTPUTS, "confidence")
         self.confident = bool(confidence)

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from gso.errors import OptionError
 from gso.net.models.base import Net
 from gso.net.models.blocks import IMDB, Stencils
+from gso.net.models.convolution import Convolution
 from gso.net.models.grid_geometry import axes
 
 _LEVELS = 3
@@ -81,12 +82,12 @@ class GSONet(Net):
         def level(width: int) -> list[nn.Module]:
             return [IMDB(width) for _ in range(blocks)]
 
-        def conv(inside: int, outside: int) -> nn.Conv2d:
-            return nn.Conv2d(inside, outside, 3, padding=1, bias=False)
+        def conv(inside: int, outside: int) -> Convolution:
+            return Convolution(inside, outside, 3, padding=1, bias=False)
 
         self.head = Stencils(3 + sigma, channels) if stencils else conv(3 + sigma, channels)
         self.down = nn.ModuleList(
-            nn.Sequential(*level(a), nn.Conv2d(a, b, 2, stride=2, bias=False)) for a, b in steps
+            nn.Sequential(*level(a), Convolution(a, b, 2, stride=2, bias=False)) for a, b in steps
         )
         self.body = nn.Sequential(*level(widths[-1]))
         self.up = nn.ModuleList(

@@ -60,7 +60,8 @@ def harm(surface: SurfaceLike) -> tuple[float, ...]:
 
     A result that grows would lower the one alone, and one that shrinks the other.
     """
-    return metrics.loss_gc_worst(surface, scale=1.0), metrics.loss_gc_worst(surface)
+    curved = metrics.loss_gc_worst(surface, scale=1.0)
+    return curved, curved * metrics.unit(surface) ** 2
 
 
 TASK = NetTask(
