@@ -1,6 +1,7 @@
-"""Pieces of designs with noses, and of rods, whose ends recede."""
+"""Pieces of designs with sharp edges, with noses, and of rods, whose ends recede."""
 
 import numpy as np
+import pytest
 
 import gso
 from gso import faults, metrics
@@ -33,6 +34,43 @@ def rod(around: int, along: int) -> Mesh:
     last = around * (along - 1)
     ends += [[len(points) - 1, last + (k + 1) % around, last + k] for k in range(around)]
     return Mesh(points, np.concatenate([faces, ends]))
+
+
+def twisted_tower(rows: int, columns: int) -> Mesh:
+    """A tower on a square, which turns by 45 degrees up to its top: four walls with sharp edges."""
+    share = np.linspace(0.0, 1.0, columns, endpoint=False)[:, None]
+    corner = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    plan = np.concatenate([(1.0 - share) * corner[k - 1] + share * corner[k] for k in range(4)])
+    height = np.linspace(0.0, 1.0, rows)
+    x, y = (1.0 - 0.2 * height[:, None]) * plan.T[:, None]
+    turn = 0.25 * np.pi * height[:, None]
+    tower = np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)])
+    points = np.stack([*tower, np.broadcast_to(4.0 * height[:, None], x.shape)], axis=-1)
+    ids = np.arange(x.size).reshape(x.shape)
+    after = np.roll(ids, -1, axis=1)
+    faces = np.stack([ids[:-1], after[:-1], after[1:], ids[1:]], axis=-1)
+    return Mesh(points.reshape(-1, 3), faces.reshape(-1, 4))
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_walls_between_sharp_edges_are_one_strip_each(triangles):
+    tower = twisted_tower(21, 6)
+    if triangles:
+        tower = Mesh(tower.vertices, tower.triangles)
+    made = gso.strips(tower, max_deviation="1%")
+    assert made.usable and made.details["strips"] == [1, 1, 1, 1]
+    assert made.details["seam_gap"] == 0.0
+    # A second measure: nothing of a strip is folded as sharply as the edges, by 90 degrees.
+    assert np.degrees(made.ruled.rulings.angles).max() < 60.0
+
+
+def test_pieces_end_at_sharp_edges():
+    found = gso.pieces(twisted_tower(21, 6), max_deviation="1%", max_strain="0.5%", workers=0)
+    assert found.usable and len(found) == 4
+    ends = found.unchanged.vertices[found.edges]
+    plan, height = ends[..., :2], ends[..., 2] / 4.0
+    away = np.linalg.norm(plan, axis=-1) / (1.0 - 0.2 * height)
+    assert np.abs(away - 1.0).max() < 1e-9
 
 
 def test_seams_follow_the_rim_of_a_nose():

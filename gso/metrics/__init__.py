@@ -10,7 +10,15 @@ they are. :data:`INFO` lists the meaning, unit and direction of every metric.
 
 from __future__ import annotations
 
-from gso.metrics.areas import area, area_error, corner_areas, flipped_cells, flipped_faces, flips
+from gso.metrics.areas import (
+    area,
+    area_error,
+    corner_areas,
+    face_areas,
+    flipped_cells,
+    flipped_faces,
+    flips,
+)
 from gso.metrics.distance import (
     Distances,
     boundary_distance,
@@ -80,6 +88,7 @@ __all__ = [
     "displacement",
     "edge_length_error",
     "edge_ratios",
+    "face_areas",
     "face_normals",
     "face_strains",
     "fairness",

@@ -23,6 +23,21 @@ def area(mesh: Mesh, points: Array | None = None) -> float:
     return float(0.5 * geometry.doubled_areas(v, mesh.triangles).sum())
 
 
+def face_areas(mesh: Mesh) -> Array:
+    """Return the area of each face (m,), of quads half the cross product of their diagonals.
+
+    >>> from gso.mesh import Mesh
+    >>> face_areas(Mesh.from_grid(np.dstack([*np.mgrid[:2.0, :3.0], np.zeros((2, 3))])))
+    array([1., 1.])
+    """
+    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    if corners.shape[1] == 3:
+        doubled = geometry.doubled_areas(mesh.vertices, corners)
+    else:
+        doubled = np.linalg.norm(geometry.quad_area_vectors(mesh.vertices, corners), axis=1)
+    return np.asarray(0.5 * doubled)
+
+
 def area_error(surface: SurfaceLike, flat: SurfaceLike) -> float:
     """Return the mean of |A'/A - 1| over the corner triangles that have an area."""
     tri = topology.corner_triangles(faces_of(surface))

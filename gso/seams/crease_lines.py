@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from gso import metrics
-from gso.geometry import doubled_areas
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.seams.kinds import Creases, edges_between
@@ -66,7 +65,7 @@ def feature_edges(mesh: Mesh) -> tuple[Ints, int]:
     # Weak ones that go on a strong one.
     crossed = weak & np.isin(line[he.origin[k]], line[crease_lines(mesh, 0.0)])
     part = label_components(len(mesh.faces), one[~crossed], two[~crossed])
-    area = doubled_areas(mesh.vertices, mesh.triangles)
+    area = metrics.face_areas(mesh)
     large = np.bincount(part, area) >= _FEATURE * area.sum()
     part = np.where(large[part], part, -1)
     f, g, turn = np.r_[one, two], np.r_[two, one], np.r_[angle, angle]

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gso import geometry, metrics
+from gso import metrics
 from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
@@ -21,7 +21,7 @@ from gso.seams.options import NARROWEST, PieceSettings
 from gso.seams.potential import Potential
 from gso.seams.sheets import Sheet, flattened
 from gso.seams.tree import Ground
-from gso.typing import Array, Flags, Ints
+from gso.typing import Flags, Ints
 from gso.verdict import Code
 
 #: How much larger than the least area and width of a part pieces are to be.
@@ -120,7 +120,7 @@ class Layouts:
         self.inner = np.zeros(len(mesh.edges), bool)
         self.inner[self.number] = True
         #: Area of each face (m,).
-        self.face_area = _face_area(mesh)
+        self.face_area = metrics.face_areas(mesh)
         self.root = float(np.sqrt(metrics.area(mesh)))
         cost = mesh.edge_lengths if ground.factor is None else mesh.edge_lengths * ground.factor
         self.cost = np.where(self.inner, cost, 0.0) / self.root
@@ -289,13 +289,3 @@ def total(parts: list[Part]) -> Faults:
     """Add up faults; excesses that differ by rounding are equal."""
     excess = round(sum(part.excess for part in parts), 6)
     return excess, sum(part.small for part in parts), sum(part.narrow for part in parts)
-
-
-def _face_area(mesh: Mesh) -> Array:
-    """Return the area of each face (m,), of quads by their diagonals."""
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    if corners.shape[1] == 3:
-        return 0.5 * geometry.doubled_areas(mesh.vertices, corners)
-    return np.asarray(
-        0.5 * np.linalg.norm(geometry.quad_area_vectors(mesh.vertices, corners), axis=1)
-    )

@@ -15,9 +15,12 @@ from gso.mesh import Mesh
 from gso.pipeline import strains_of
 from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
+from gso.seams.crease_lines import feature_edges
+from gso.seams.cutting import cut
 from gso.seams.edge_rows import rows_or_triangles
 from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.joint_solve import solve_pieces
+from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
@@ -82,7 +85,7 @@ def reshaped(
         begin = tried[-1].proximity / _STRONGER if tried else 1.0
         tried.append(_attempt(ground, cut_open, level, max(begin, 1.0), allowed, settings))
     best = min(
-        tried,
+        tried + _along_creases(ground, allowed, settings),
         key=lambda a: (
             max(a.excess, 1.0),
             *settings.value(len(a.pieces), a.pieces.seam_length),
@@ -90,6 +93,18 @@ def reshaped(
     )
     best = _with_straight_seams(ground, best, settings, allowed)
     return _patterns(ground, best.pieces, settings), best.result
+
+
+def _along_creases(ground: Ground, allowed: float, settings: PieceSettings) -> list[_Attempt]:
+    """Solve the pieces between the creases of a design, if seams may be anywhere."""
+    edges, others = feature_edges(ground.mesh)
+    if not others or ground.factor is not None:
+        return []
+    settings.say("seams along creases")
+    pieces = cut(ground.mesh, Edges(np.concatenate([ground.kept, edges])))
+    if not all(piece.is_disk for piece in pieces):
+        return []
+    return [_attempt(ground, pieces, _FIRST, 1.0, allowed, settings)]
 
 
 def at_scale(mesh: Mesh, distance: float | None) -> bool:

@@ -136,6 +136,10 @@ class LineStrips:
         found = (choice.lines(count) for choice in self.choices)
         return min((f[1] for f in found if f is not None), default=np.inf)
 
+    def cautious(self, count: int) -> float:
+        """Return the predicted distance, and more where rulings are not conjugate to the lines."""
+        return min((choice.rank(count) for choice in self.choices), default=np.inf)
+
     def strips(self, count: int) -> Found | None:
         """Return the best strips of at most a number, which is solved for; None if there are none.
 

@@ -38,8 +38,9 @@ from gso.ruled.paneling.surface_strips import (
     of_surface,
     unsolved,
 )
-from gso.ruled.paneling.tried_strips import Tried
+from gso.ruled.paneling.tried_strips import FOLDED, Tried
 from gso.seams import Edges, Segmentation, cut
+from gso.seams.crease_lines import feature_edges
 from gso.seams.seam_request import without_seams
 from gso.typing import Ints, MeshLike
 from gso.verdict import Reason, crosses_itself, judge, ordered
@@ -51,6 +52,8 @@ _MANY = 8
 #: Number of strips, and distance over the predicted one, from which lines do not suit a design:
 #: rulings across them twist, and pieces may be fewer.
 _SEVERAL, _TWISTED = 6, 5.0
+#: Number of faces between creases from which on these are not tried as pieces.
+_FACES = 24
 
 
 @dataclass(frozen=True)
@@ -160,7 +163,7 @@ class StripsTask:
             others = self._along_lines, self._as_a_whole
         else:
             others = self._as_a_whole, self._along_lines
-        return self._as_it_is, self._kept_smooth, *others
+        return self._as_it_is, self._kept_smooth, self._between_creases, *others
 
     @property
     def _many(self) -> bool:
@@ -236,6 +239,33 @@ class StripsTask:
             return []
         return [self._judged(result)]
 
+    def _between_creases(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
+        """Return one strip for each face of the design, if creases divide it into a few disks.
+
+        Strips that run across creases are folded there. They are better only if they are far fewer.
+        """
+        asked = self.request
+        if tried or not asked.may_be_cut or asked.seams.preferences:
+            return []
+        if self._lines is None and not _is_whole(light.mesh):
+            return []
+        edges, others = feature_edges(light.mesh)
+        if not 0 < others < _FACES:
+            return []
+        faces, bound = cut(light.mesh, Edges(edges)), asked.max_deviation or 0.0
+        if self._lines is not None:
+            few = len(faces) // FOLDED
+            if self._lines.cautious(few) * self.design.diagonal <= bound:
+                return []
+        if not all(face.is_disk for face in faces):
+            return []
+        asked.say("between its creases")
+        try:
+            found = of_pieces(light, asked, faces, single=True)
+        except GSOError:
+            return []
+        return [replace(self._judged_pieces(*found), creased=True)]
+
     @cached_property
     def _exact(self) -> StripsResult | None:
         """The design as it is, if it is developable and may be kept."""
@@ -251,8 +281,8 @@ class StripsTask:
         asked = self.request
         if any(self._is_enough(one) for one in tried) or not _is_whole(light.mesh):
             return []
-        held = [one.strips for one in tried if self._counted and one.holds]
-        most = min([asked.options.max_strips, *(count - 1 for count in held)])
+        held = [one.fewer for one in tried if self._counted and one.holds]
+        most = min([asked.options.max_strips, *held])
         if most < 1:
             return []
         asked = replace(asked, options=replace(asked.options, max_strips=most))
@@ -322,7 +352,9 @@ class StripsTask:
         for one in tried:
             surface, bound = one.result.ruled, asked.max_deviation
             if one.holds and surface is not None and bound is not None and self.divisible:
-                most = min(surface.strips - 1, lines.most)
+                most = min(one.fewer, lines.most)
+                if most < 1:
+                    return []
                 if _FAR * lines.predicted(most) > bound / self.design.diagonal:
                     return []
             elif one.is_near if self.divisible else one.is_close:

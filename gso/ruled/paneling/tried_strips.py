@@ -12,15 +12,22 @@ from gso.verdict import Code, Reason
 
 #: Distance relative to the diagonal at which strips need not be nearer.
 _CLOSE = 1e-4
+#: How many strips that are cut along creases count as one that runs across creases, and is folded
+#: there.
+FOLDED = 2
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A result, the reasons against it, and what it was before it was divided for a sheet."""
+    """A result, the reasons against it, and what it was before it was divided for a sheet.
+
+    `creased` says that it is cut along the creases of the design, so that no strip is folded there.
+    """
 
     result: Result
     reasons: tuple[Reason, ...]
     undivided: Result | None = None
+    creased: bool = False
 
     @property
     def wide(self) -> Result:
@@ -37,12 +44,14 @@ class Tried:
         """Whether it is what was asked for."""
         return not (self.reasons or self.result.status.is_failure)
 
-    def order(self, *, few: bool) -> tuple[bool, bool, int, float]:
+    def order(self, *, few: bool) -> tuple[bool, bool, float, float]:
         """Sort key: what was asked for first, then what is neither folded nor crosses itself.
 
         Fewer strips before more if asked, then distances.
         """
-        surface, count = self.result.ruled, self.strips if few and self.holds else 0
+        surface, count = self.result.ruled, 0.0
+        if few and self.holds:
+            count = self.strips / (FOLDED if self.creased else 1)
         broken = not self.holds and (surface is None or not surface.sound)
         return not self.holds, broken, count, self.far
 
@@ -51,6 +60,11 @@ class Tried:
         """Number of strips."""
         surface = self.result.ruled
         return 0 if surface is None else surface.strips
+
+    @property
+    def fewer(self) -> int:
+        """The number of strips that others across the creases may have to be better."""
+        return self.strips // FOLDED if self.creased else self.strips - 1
 
     @property
     def is_close(self) -> bool:
