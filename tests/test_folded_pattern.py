@@ -146,6 +146,35 @@ def test_a_half_cylinder_is_a_rectangle_with_parallel_lines():
     np.testing.assert_allclose([bend.radius for bend in bends], 1500.0, rtol=1e-6)
 
 
+@pytest.mark.parametrize("given", ["grid", "quads"])
+def test_quads_under_the_hip_of_a_roof_are_folded_along_it(given):
+    x, y = np.mgrid[:12.0:25j, :8.0:17j]
+    rise = np.minimum(np.minimum(x, 12.0 - x), np.minimum(y, 8.0 - y))
+    roof = Mesh.from_grid(np.dstack([x, y, 0.7 * rise]))
+    if given == "quads":
+        roof = Mesh(roof.vertices, roof.faces[::-1])
+    found = folded_pattern(roof)
+    assert found.parts == 1
+    # Its area is that of four planes; along the other diagonals it would be smaller.
+    assert metrics.area(found.surface) == pytest.approx(96.0 * np.hypot(1.0, 0.7), rel=1e-12)
+    # Three of the five folds join four faces to one part, and each is a straight line.
+    angles = np.abs(found.folded.angles)
+    ridge, hip = 2.0 * np.arctan(0.7), np.arccos(1.0 / (1.0 + 0.7**2))
+    assert np.minimum(abs(angles - ridge), abs(angles - hip)).max() < 1e-9
+    ends = found.pattern.flat[found.folded.edges]
+    way = np.diff(ends, axis=1)[:, 0]
+    assert len(np.unique(np.round(np.degrees(np.arctan2(way[:, 1], way[:, 0])) % 180.0, 6))) == 3
+
+
+def test_a_groin_vault_of_quads_is_four_rolled_faces():
+    x, y = np.mgrid[-4.0:4.0:25j, -4.0:4.0:25j]
+    height = np.maximum(np.sqrt(16.2 - x**2), np.sqrt(16.2 - y**2))
+    vault = Mesh.from_grid(np.dstack([x, y, height]))
+    found = folded_pattern(Mesh(vault.vertices, vault.faces))
+    assert found.parts == 4
+    assert found.strain < 1e-9
+
+
 def test_lines_of_a_turned_grid_are_the_rulings():
     design = half_cylinder(shape=(30, 50), turned=np.radians(30))
     found = folded_pattern(design)

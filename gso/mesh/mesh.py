@@ -177,10 +177,13 @@ class Mesh:
             ids = self.grid_index.ravel()
             quads = ids[topology.grid_faces(*self.grid_index.shape)]
             return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-        return topology.triangulate(self.faces, self._quad_splits)
+        return topology.triangulate(self.faces, self.quad_splits)
 
     @cached_property
-    def _quad_splits(self) -> Flags:
+    def quad_splits(self) -> Flags:
+        """Mask (m,) of the quads whose triangles meet at the diagonal 1-3 instead of 0-2."""
+        if self.grid_index is not None:
+            return np.zeros(len(self.faces), bool)
         inwards = np.full(len(self.faces), -1)
         quad = topology.are_quads(self.faces)
         if quad.any():
@@ -206,7 +209,7 @@ class Mesh:
         """
         if self.grid_index is not None:
             return tuple(topology.grid_stars(self.grid_index, r) for r in geometry.GRID_RINGS)
-        own, other = topology.vertex_stars(self.faces, self.half_edges, self._quad_splits)
+        own, other = topology.vertex_stars(self.faces, self.half_edges, self.quad_splits)
         return (own,) if self.is_triangles else (own, other)
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from gso import geometry
 from gso.geometry.vectors import fold_angles
 from gso.mesh import Mesh, topology
+from gso.recognition.fold_diagonals import fold_triangles
 from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ class FacetGraph:
     def of(cls, mesh: Mesh, allowed: float = 0.0) -> FacetGraph:
         """Make the graph of a mesh; distances up to `allowed` are within the tolerance, too."""
         step = coordinate_step(mesh.vertices[mesh.used])
-        return cls(mesh.vertices, mesh.triangles, step, allowed)
+        return cls(mesh.vertices, fold_triangles(mesh), step, allowed)
 
     def refined(self, points: Array, triangles: Ints, source: Ints) -> FacetGraph:
         """Return the graph of a refined mesh; facets are those of the triangles' sources (t2,)."""

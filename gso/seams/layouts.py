@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from gso import metrics
-from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.seams.candidates import Candidate, fits
@@ -210,9 +209,8 @@ class Layouts:
             excess += _FOLDED
         if settings.max_size is not None and not fits(sheet, settings.max_size):
             excess += _FOLDED
-        width = mean_width([sheet.flat[loop] for loop in sheet.mesh.boundary_loops])
         least = _CLEAR * float(Code.NARROW.info.limit or 0.0) * self.ground.mesh.size
-        small = small or width < least
+        small = small or sheet.mean_width < least
         if settings.min_size is not None:
             small = small or sheet.size[0] < settings.min_size
         neck = max(NARROWEST * root, settings.min_neck or 0.0)

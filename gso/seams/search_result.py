@@ -9,7 +9,6 @@ import numpy as np
 from gso import faults, metrics
 from gso.cut_pieces import Pieces
 from gso.geometry import chain_turns
-from gso.geometry.polygon import mean_width
 from gso.mesh import Mesh
 from gso.result import Result
 from gso.seams.candidates import Candidate
@@ -17,6 +16,7 @@ from gso.seams.facets import FACETS, mean_angle
 from gso.seams.inverted_faces import inverted_at_seams
 from gso.seams.options import NECK, PieceSettings
 from gso.seams.segmentation import Segmentation
+from gso.seams.sheets import too_small
 from gso.typing import Ints
 from gso.verdict import Code, Measurement, compare
 from gso.verdict.surface_checks import crossed, of_surface
@@ -67,12 +67,8 @@ def packed(
     }
     joined = sorted(set(own.sides[np.ptp(own.sides, axis=1) > 0].ravel().tolist()))
     if joined and len(whole) == count:
-        areas = np.array([metrics.area(own[k].mesh) for k in joined])
-        outlines = [[whole[k].flat[x] for x in whole[k].mesh.boundary_loops] for k in joined]
-        widths = np.array([mean_width(loops) for loops in outlines])
         some = [names[k] for k in joined]
-        measured[Code.SMALL] = Measurement(areas / size**2, "piece", some)
-        measured[Code.NARROW] = Measurement(widths / given.size, "piece", some)
+        measured |= too_small([whole[k] for k in joined], size**2, given.size, "piece", some)
     turn = float(np.degrees(chain_turns(own.edges, own.design.vertices)).sum())
     along = 100.0 * float(own.lengths.sum()) / own.design.diagonal
     numbers["seam_turn"] = turn / along if along > 0 else 0.0

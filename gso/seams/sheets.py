@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from gso import faults, metrics
-from gso.geometry.polygon import rectangle
+from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh, Paths
 from gso.pattern import Folded
 from gso.pipeline import lay_out
 from gso.short_repr import short_repr
 from gso.typing import Array, Ints
+from gso.verdict import Code, Measurement
 
 #: Smallest share of a piece's area on both sides of a neck.
 _SHARE = 0.02
@@ -83,6 +85,11 @@ class Sheet:
         """Length and width of the smallest bounding rectangle."""
         return rectangle(self.flat)[1]
 
+    @cached_property
+    def mean_width(self) -> float:
+        """Twice the area over the perimeter: the width, for a long strip."""
+        return mean_width([self.flat[loop] for loop in self.mesh.boundary_loops])
+
     def neck(self, limit: float) -> float:
         """Return the width at the narrowest place, or a limit where that is less.
 
@@ -108,6 +115,21 @@ class Sheet:
         k = int(real[away[i, j][real].argmin()])
         width = float(away[i[k], j[k]])
         return (width, (int(loop[i[k]]), int(loop[j[k]]))) if width < limit else (limit, None)
+
+
+def too_small(
+    parts: Sequence[Sheet], area: float, size: float, place: str, names: Sequence[str] = ()
+) -> dict[Code, Measurement]:
+    """Measure parts that are joined to others, to find those that nobody would make.
+
+    Their areas are relative to that of the design, and their mean widths to its size.
+    """
+    areas = np.array([metrics.area(part.mesh) for part in parts])
+    widths = np.array([part.mean_width for part in parts])
+    return {
+        Code.SMALL: Measurement(areas / area, place, names),
+        Code.NARROW: Measurement(widths / size, place, names),
+    }
 
 
 def laid(mesh: Mesh, formulation: str = "strain") -> Sheet | None:

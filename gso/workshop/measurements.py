@@ -7,12 +7,12 @@ import numpy as np
 from gso import faults, metrics, rulings
 from gso.components import split
 from gso.errors import MeshError
-from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh
 from gso.mesh.topology import edge_keys, pair_keys
 from gso.metrics import Distances
 from gso.pattern import Pattern
 from gso.seams import Sheet
+from gso.seams.sheets import too_small
 from gso.typing import Json
 from gso.verdict import Code, Measurement, Reason, compare, merge, ordered
 from gso.workshop.fabrication_settings import FabricationSettings
@@ -67,7 +67,8 @@ def of_pattern(
 def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     """Return why panels are not what was asked for, beside the reasons of their solve."""
     record, names = made.record, [panel.name for panel in made.panels]
-    sizes = np.array([rectangle(panel.flat)[1] for panel in made.panels])
+    sheets = {panel.name: Sheet(panel.surface, panel.flat) for panel in made.panels}
+    sizes = np.array([sheet.size for sheet in sheets.values()])
     # Strips keep the smallest radius themselves, or say why not.
     plain = [panel for panel in made.panels if settings.min_radius and not _is_strip(panel)]
     wide, long = (None, None) if settings.max_size is None else sorted(settings.max_size)
@@ -94,14 +95,12 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     pairs = [{seam.one.panel, seam.two.panel} for seam in made.matings]
     joined = [made.panels[k] for k in sorted(set().union(*(p for p in pairs if len(p) > 1)))]
     if joined:
-        own = [panel.name for panel in joined]
-        areas = np.array([metrics.area(panel.surface) for panel in joined])
-        widths = [mean_width([p.flat[loop] for loop in p.loops]) for p in joined]
-        measured[Code.SMALL] = Measurement(areas / record["area"], "part", own)
-        measured[Code.NARROW] = Measurement(np.array(widths) / record["size"], "part", own)
+        own, some = [panel.name for panel in joined], [sheets[panel.name] for panel in joined]
+        measured |= too_small(some, record["area"], record["size"], "part", own)
     asked = settings.seams()
-    sheets = [Sheet(panel.surface, panel.flat) for panel in made.panels]
-    later = ordered([*compare(measured, limits), *asked.reasons(record["pieces"], sheets, names)])
+    later = ordered(
+        [*compare(measured, limits), *asked.reasons(record["pieces"], list(sheets.values()), names)]
+    )
     # The solve may have had another design in its place, or less room; pieces may have become
     # other parts; and a strain that is too large is said as the record has it.
     decided = {Code.DEVIATION, Code.PIECES, Code.NECK, Code.TOO_SHORT} | (

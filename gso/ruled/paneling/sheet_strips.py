@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso import metrics
 from gso.components import split
 from gso.geometry.polygon import rectangle
 from gso.geometry.vectors import lengths
@@ -14,6 +15,7 @@ from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.sheet_division import divided_to_fit
 from gso.seams import Sheet
+from gso.seams.sheets import too_small
 from gso.status import Status
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare
@@ -42,6 +44,21 @@ def against_parts(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in parts]
     pieces = 1 if result.pieces is None else len(result.pieces)
     return (*reasons, *request.seams.reasons(pieces, sheets))
+
+
+def against_slivers(result: StripsResult) -> tuple[Reason, ...]:
+    """Return the reasons if parts that are joined to others are smaller than anybody would make."""
+    design, pattern = result.design, result.pattern
+    if pattern is None:
+        return ()
+    parts = split(pattern.surface(result.mesh))
+    own = np.concatenate([np.unique(pattern.vertex[part.vertices]) for part in parts])
+    shared = np.bincount(own) > 1
+    joined = [part for part in parts if shared[pattern.vertex[part.vertices]].any()]
+    sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in joined]
+    if not sheets:
+        return ()
+    return compare(too_small(sheets, metrics.area(design), design.size, "part"), {})
 
 
 def _against_pleats(result: Result, request: StripsRequest) -> tuple[Reason, ...]:

@@ -23,6 +23,7 @@ from gso.ruled.paneling.piece_strips import found_pieces, of_found, of_pieces
 from gso.ruled.paneling.sheet_strips import (
     against_parts,
     against_sheet,
+    against_slivers,
     divided,
     longest_ruling,
     on_sheets,
@@ -274,8 +275,11 @@ class StripsTask:
         return exact_strips(self.design, self.request, self.kept)
 
     def _judged(self, result: StripsResult) -> Tried:
-        reasons = judge(result, self.request.limits)
-        return Tried(result, ordered([*reasons, *against_parts(result, self.request)]))
+        reasons = [*judge(result, self.request.limits), *against_parts(result, self.request)]
+        if self.divisible:
+            # Other strips within the distance may be parts that can be made.
+            reasons += against_slivers(result)
+        return Tried(result, ordered(reasons))
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request

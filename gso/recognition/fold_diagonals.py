@@ -1,0 +1,115 @@
+"""Quads that are folded along a diagonal, such as those of a grid under the hip of a roof."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gso.geometry.vectors import lengths, unit
+from gso.mesh import Mesh, topology
+from gso.typing import Array, Flags, Ints
+
+#: Ratio of the angles to the neighbours with both diagonals up to which a quad is folded along one,
+#: if it is folded there by more than these; and up to which it continues such a fold.
+_LESS, _CONTINUED = 0.6, 1.01
+#: Least sum of the angles with the worse diagonal, in radians.
+_LEAST = np.radians(5.0)
+#: How often quads are divided again: beside others that are folded, too.
+_ROUNDS = 4
+
+
+def fold_triangles(mesh: Mesh) -> Ints:
+    """Return the triangles of a mesh, with quads divided along the folds that cross them.
+
+    A quad that is not planar may be divided along either diagonal. The mesh's own choice follows
+    its other quads. Where the angles to the triangles around it are far smaller with the other
+    diagonal, the surface is folded there.
+
+    Returns
+    -------
+    ndarray of int, (t, 3)
+        In the order of ``mesh.triangles``.
+
+    Examples
+    --------
+    >>> x, y = np.mgrid[:3.0, :3.0]
+    >>> hip = Mesh.from_grid(np.dstack([x, y, np.minimum(x, 2.0 - y)]))
+    >>> hip.triangles[[1, 5]].tolist(), fold_triangles(hip)[[1, 5]].tolist()
+    ([[1, 4, 5], [1, 5, 2]], [[4, 5, 2], [4, 2, 1]])
+    """
+    quad = np.flatnonzero(topology.are_quads(mesh.faces))
+    if not len(quad):
+        return mesh.triangles
+    he, corner = mesh.half_edges, mesh.vertices[mesh.faces[quad]]
+    count = np.where(topology.are_quads(mesh.faces), 4, 3)
+    side = (np.cumsum(count) - count)[quad][:, None] + np.arange(4)
+    twin = he.twin[side]
+    normals = [_normals(corner, split) for split in (0, 1)]
+    # Opposite sides are of different triangles.
+    fold = np.array([_angles(n[:, 0], n[:, 2]) for n in normals])
+    turned = begun = mesh.quad_splits[quad]
+    at_side = np.zeros((len(he.twin), 3))
+    single = ~topology.are_quads(mesh.faces)
+    at_side[single[he.face]] = _of_triangles(mesh)[he.face[single[he.face]]]
+    for _ in range(_ROUNDS):
+        at_side[side] = np.where(turned[:, None, None], normals[1], normals[0])
+        bent = [np.where(twin < 0, 0.0, _angles(n, at_side[twin])).sum(axis=1) for n in normals]
+        folded = _folded(mesh.faces[quad], np.array(bent), fold)
+        change = (folded != turned) & (folded >= 0)
+        if not change.any():
+            break
+        turned = turned ^ change
+    if np.array_equal(turned, begun):
+        return mesh.triangles
+    return _divided(mesh, quad, turned)
+
+
+def _folded(quads: Ints, bent: Array, fold: Array) -> Ints:
+    """Return the diagonal that each quad (q, 4) is folded along: 0, 1, or -1 for none.
+
+    For either diagonal `bent` (2, q) is the sum of the angles between the quad's triangles and
+    their neighbours, and `fold` (2, q) the angle at the diagonal.
+    """
+    better, low, high = np.argmin(bent, axis=0), bent.min(axis=0), bent.max(axis=0)
+    own = np.take_along_axis(fold, better[None], axis=0)[0]
+    clear = (low < _LESS * high) & (high > _LEAST) & (own > low)
+    ends = np.stack([quads[:, [0, 2]], quads[:, [1, 3]]])
+    folds = ends[better[clear], clear]
+    # At its end a fold is no sharper than the surface is bent.
+    goes_on = np.isin(ends, folds).any(axis=2) & (bent <= _CONTINUED * bent[::-1])
+    goes_on &= (high > _LEAST) & ~clear
+    return np.where(
+        clear | goes_on.any(axis=0), np.where(clear, better, goes_on.argmax(axis=0)), -1
+    )
+
+
+def _divided(mesh: Mesh, quad: Ints, turned: Flags) -> Ints:
+    """Divide quads along the diagonal 1-3 where they are turned, and else along 0-2."""
+    splits = mesh.quad_splits.copy()
+    splits[quad] = turned
+    made: Ints = topology.triangulate(mesh.faces, splits)
+    if mesh.grid_index is None:
+        return made
+    # First one triangle of each quad, then the others.
+    return np.asarray(made.reshape(-1, 2, 3).transpose(1, 0, 2).reshape(-1, 3))
+
+
+def _normals(corner: Array, split: int) -> Array:
+    """Return the normals (q, 4, 3) of quads (q, 4, 3) at their sides, as they are divided.
+
+    With ``split=1`` it is along the diagonal 1-3.
+    """
+    a, b, c, d = np.roll(corner, -split, axis=1).transpose(1, 0, 2)
+    one, other = unit(np.cross(b - a, c - a)), unit(np.cross(c - a, d - a))
+    return np.roll(np.stack([one, one, other, other], axis=1), split, axis=1)
+
+
+def _of_triangles(mesh: Mesh) -> Array:
+    """Return the normals (m, 3) of faces by their first three corners."""
+    a, b, c = mesh.vertices[mesh.faces[:, :3]].transpose(1, 0, 2)
+    return unit(np.cross(b - a, c - a))
+
+
+def _angles(one: Array, other: Array) -> Array:
+    """Return the angles between unit vectors, along the last axis."""
+    cosine = np.einsum("...d,...d->...", one, other)
+    return np.asarray(np.arctan2(lengths(np.cross(one, other)), cosine))
