@@ -8,13 +8,13 @@ from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, topology
 from gso.typing import Array, Flags, Ints
 
-#: Ratio of the angles to the neighbours with both diagonals up to which a quad is folded along one,
-#: if it is folded there by more than these; and up to which it continues such a fold.
-_LESS, _CONTINUED = 0.6, 1.01
-#: Least sum of the angles with the worse diagonal, in radians.
-_LEAST = np.radians(5.0)
+#: Ratio of the angles to the neighbours with both diagonals up to which a quad is folded along one;
+#: least angle of a fold, in radians, and least ratio of it to the sum of those to the neighbours.
+_LESS, _LEAST, _SHARPER = 0.3, np.radians(5.0), 2.0
+#: The same ratios where a quad goes on from the end of a fold.
+_CONTINUED, _WEAK = 1.01, 0.25
 #: How often quads are divided again: beside others that are folded, too.
-_ROUNDS = 4
+_ROUNDS = 8
 
 
 def fold_triangles(mesh: Mesh) -> Ints:
@@ -50,36 +50,42 @@ def fold_triangles(mesh: Mesh) -> Ints:
     at_side = np.zeros((len(he.twin), 3))
     single = ~topology.are_quads(mesh.faces)
     at_side[single[he.face]] = _of_triangles(mesh)[he.face[single[he.face]]]
+    folded = np.full(len(quad), -1)
     for _ in range(_ROUNDS):
         at_side[side] = np.where(turned[:, None, None], normals[1], normals[0])
         bent = [np.where(twin < 0, 0.0, _angles(n, at_side[twin])).sum(axis=1) for n in normals]
-        folded = _folded(mesh.faces[quad], np.array(bent), fold)
-        change = (folded != turned) & (folded >= 0)
-        if not change.any():
+        before, folded = folded, _folded(mesh.faces[quad], np.array(bent), fold, folded)
+        if np.array_equal(folded, before):
             break
-        turned = turned ^ change
+        turned = np.where(folded < 0, begun, folded == 1)
     if np.array_equal(turned, begun):
         return mesh.triangles
     return _divided(mesh, quad, turned)
 
 
-def _folded(quads: Ints, bent: Array, fold: Array) -> Ints:
+def _folded(quads: Ints, bent: Array, fold: Array, before: Ints) -> Ints:
     """Return the diagonal that each quad (q, 4) is folded along: 0, 1, or -1 for none.
 
-    For either diagonal `bent` (2, q) is the sum of the angles between the quad's triangles and
-    their neighbours, and `fold` (2, q) the angle at the diagonal.
+    Parameters
+    ----------
+    quads : ndarray of int, (q, 4)
+    bent, fold : ndarray, (2, q)
+        For either diagonal the sum of the angles between the quad's triangles and their
+        neighbours, and the angle at the diagonal.
+    before : ndarray of int, (q,)
+        Those that were found before; they stay.
     """
-    better, low, high = np.argmin(bent, axis=0), bent.min(axis=0), bent.max(axis=0)
+    low, high, better = bent.min(axis=0), bent.max(axis=0), np.argmin(bent, axis=0)
     own = np.take_along_axis(fold, better[None], axis=0)[0]
-    clear = (low < _LESS * high) & (high > _LEAST) & (own > low)
+    clear = (low < _LESS * high) & (own > _LEAST) & (own > _SHARPER * low)
+    # Those that go on from the end of a fold.
     ends = np.stack([quads[:, [0, 2]], quads[:, [1, 3]]])
-    folds = ends[better[clear], clear]
-    # At its end a fold is no sharper than the surface is bent.
-    goes_on = np.isin(ends, folds).any(axis=2) & (bent <= _CONTINUED * bent[::-1])
-    goes_on &= (high > _LEAST) & ~clear
-    return np.where(
-        clear | goes_on.any(axis=0), np.where(clear, better, goes_on.argmax(axis=0)), -1
-    )
+    known = np.where(before < 0, np.where(clear, better, -1), before)
+    some = np.flatnonzero(known >= 0)
+    near = np.isin(ends, ends[known[some], some]).any(axis=2)
+    near &= (bent <= _CONTINUED * bent[::-1]) & (fold > _WEAK * bent) & (high > _LEAST)
+    found = np.where(clear, better, np.where(near.any(axis=0), near.argmax(axis=0), -1))
+    return np.where(before < 0, found, before)
 
 
 def _divided(mesh: Mesh, quad: Ints, turned: Flags) -> Ints:
