@@ -27,8 +27,8 @@ def face_areas(mesh: Mesh) -> Array:
     """Return the area of each face (m,), of quads half the cross product of their diagonals.
 
     >>> from gso.mesh import Mesh
-    >>> face_areas(Mesh.from_grid(np.dstack([*np.mgrid[:2.0, :3.0], np.zeros((2, 3))])))
-    array([1., 1.])
+    >>> face_areas(Mesh.from_grid(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])))
+    array([1., 1., 1., 1.])
     """
     corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
     if corners.shape[1] == 3:
