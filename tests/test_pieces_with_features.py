@@ -64,6 +64,13 @@ def test_walls_between_sharp_edges_are_one_strip_each(triangles):
     assert np.degrees(made.ruled.rulings.angles).max() < 60.0
 
 
+def test_walls_may_end_at_diagonals_of_quads():
+    x, y = np.mgrid[-1.0:1.0:29j, -1.0:1.0:29j]
+    height = 0.6 * (1.0 - np.maximum(abs(x), abs(y))) ** 1.4
+    made = gso.strips(np.dstack([x, y, height]), max_deviation="1%")
+    assert made.usable and made.details["strips"] == [1, 1, 1, 1]
+
+
 def test_pieces_end_at_sharp_edges():
     found = gso.pieces(twisted_tower(21, 6), max_deviation="1%", max_strain="0.5%", workers=0)
     assert found.usable and len(found) == 4

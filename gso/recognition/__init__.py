@@ -9,6 +9,7 @@
 
 from gso.recognition.bend_lines import BendLine, bend_step_of
 from gso.recognition.facet_graph import coordinate_step
+from gso.recognition.fold_diagonals import fold_triangles
 from gso.recognition.recognise import recognise
 from gso.recognition.round_surface import RoundSurface
 from gso.recognition.shape_face import Recognised, ShapeFace
@@ -20,5 +21,6 @@ __all__ = [
     "ShapeFace",
     "bend_step_of",
     "coordinate_step",
+    "fold_triangles",
     "recognise",
 ]

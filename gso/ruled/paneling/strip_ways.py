@@ -14,6 +14,7 @@ from gso.errors import GSOError, MeshError
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of
+from gso.recognition import fold_triangles
 from gso.result import Result, StripsResult
 from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.exact_strips import exact_strips
@@ -250,10 +251,14 @@ class StripsTask:
             return []
         if self._lines is None and not _is_whole(light.mesh):
             return []
-        edges, others = feature_edges(light.mesh)
+        mesh, triangles = light.mesh, fold_triangles(light.mesh)
+        if not np.array_equal(triangles, mesh.triangles):
+            # Its sharp edges are diagonals of quads.
+            mesh = Mesh(mesh.vertices, triangles)
+        edges, others = feature_edges(mesh)
         if not 0 < others < _FACES:
             return []
-        faces, bound = cut(light.mesh, Edges(edges)), asked.max_deviation or 0.0
+        faces, bound = cut(mesh, Edges(edges)), asked.max_deviation or 0.0
         if self._lines is not None:
             few = len(faces) // FOLDED
             if self._lines.cautious(few) * self.design.diagonal <= bound:
@@ -332,8 +337,9 @@ class StripsTask:
         """Return whether strips are many, as the rulings across the lines of the design twist."""
         if self._lines is None or not self._counted:
             return False
-        best = min(tried, key=lambda one: one.order(few=True)).wide.ruled
-        if best is None or best.strips < _SEVERAL:
+        first = min(tried, key=lambda one: one.order(few=True))
+        best = first.wide.ruled
+        if first.creased or best is None or best.strips < _SEVERAL:
             return False
         return best.farthest > _TWISTED * self._lines.predicted(best.strips) * self.design.diagonal
 
