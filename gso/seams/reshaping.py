@@ -100,7 +100,7 @@ def _along_creases(ground: Ground, allowed: float, settings: PieceSettings) -> l
     edges, others = feature_edges(ground.mesh)
     if not others or ground.factor is not None:
         return []
-    settings.say("seams along creases")
+    settings.say("seams along sharp edges")
     pieces = cut(ground.mesh, Edges(np.concatenate([ground.kept, edges])))
     if not all(piece.is_disk for piece in pieces):
         return []

@@ -67,8 +67,8 @@ def of_pattern(
 def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     """Return why panels are not what was asked for, beside the reasons of their solve."""
     record, names = made.record, [panel.name for panel in made.panels]
-    sheets = {panel.name: Sheet(panel.surface, panel.flat) for panel in made.panels}
-    sizes = np.array([sheet.size for sheet in sheets.values()])
+    sheets = [Sheet(panel.surface, panel.flat) for panel in made.panels]
+    sizes = np.array([sheet.size for sheet in sheets])
     # Strips keep the smallest radius themselves, or say why not.
     plain = [panel for panel in made.panels if settings.min_radius and not _is_strip(panel)]
     wide, long = (None, None) if settings.max_size is None else sorted(settings.max_size)
@@ -93,14 +93,12 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     unmarked = np.array([_unmarked_fold(panel) for panel in made.panels])
     measured[Code.UNMARKED_FOLD] = Measurement(unmarked, "part", names)
     pairs = [{seam.one.panel, seam.two.panel} for seam in made.matings]
-    joined = [made.panels[k] for k in sorted(set().union(*(p for p in pairs if len(p) > 1)))]
+    joined = sorted(set().union(*(p for p in pairs if len(p) > 1)))
     if joined:
-        own, some = [panel.name for panel in joined], [sheets[panel.name] for panel in joined]
+        own, some = [made.panels[k].name for k in joined], [sheets[k] for k in joined]
         measured |= too_small(some, record["area"], record["size"], "part", own)
     asked = settings.seams()
-    later = ordered(
-        [*compare(measured, limits), *asked.reasons(record["pieces"], list(sheets.values()), names)]
-    )
+    later = ordered([*compare(measured, limits), *asked.reasons(record["pieces"], sheets, names)])
     # The solve may have had another design in its place, or less room; pieces may have become
     # other parts; and a strain that is too large is said as the record has it.
     decided = {Code.DEVIATION, Code.PIECES, Code.NECK, Code.TOO_SHORT} | (

@@ -265,7 +265,7 @@ class StripsTask:
                 return []
         if not all(face.is_disk for face in faces):
             return []
-        asked.say("between its creases")
+        asked.say("between its sharp edges")
         try:
             found = of_pieces(light, asked, faces, single=True)
         except GSOError:
