@@ -54,6 +54,12 @@ def measured(task: str, model: Any, split: Any, count: int = 0) -> dict[str, flo
     }
 
 
+def task_of(name: str) -> str:
+    """Return the task of a net, or of a chain of nets."""
+    task: str = catalogue.read_card(catalogue.located(catalogue.parts(name)[0]))["model"]["task"]
+    return task
+
+
 def over(task: str, model: Any, split: Any, array: str, count: int) -> dict[str, float]:
     """Return the mean metrics over a split."""
     figures, rows = tasks.get(task).figures, []
@@ -92,8 +98,7 @@ def rows(
     """
     opened, out = dataset.open(data), {}
     for name in [model] if model else net.available():
-        first = catalogue.CHAINS.get(name, (name,))[0]
-        task = catalogue.read_card(catalogue.located(first))["model"]["task"]
+        task = task_of(name)
         noisy = tasks.get(task).noisy
         found = measured(task, name, opened["test"], n)
         found["ms"] = milliseconds(task, name, opened["test"][TIMED if noisy else "surface"][0])
@@ -241,8 +246,7 @@ def cost(n: int = 40) -> dict[str, Any]:
     matrix[0] = 10.0
     ways = {"Cholesky factorisation": partial(cholesky_banded, matrix, lower=True)}
     for name in net.available():
-        task = catalogue.read_card(catalogue.located(catalogue.parts(name)[0]))["model"]["task"]
-        ways[name] = partial(net.predict, surface, task=task, model=name)
+        ways[name] = partial(net.predict, surface, task=task_of(name), model=name)
     ways["developable, one pass"] = partial(net.predict, surface, passes=1)
     spent = {name: np.empty(n) for name in ways}
     for k in range(-1, n):

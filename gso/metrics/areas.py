@@ -30,10 +30,10 @@ def face_areas(mesh: Mesh) -> Array:
     >>> face_areas(Mesh.from_grid(np.dstack([*np.mgrid[:3.0, :3.0], np.zeros((3, 3))])))
     array([1., 1., 1., 1.])
     """
-    corners = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    if corners.shape[1] == 3:
-        doubled = geometry.doubled_areas(mesh.vertices, corners)
+    if mesh.faces.shape[1] == 3:
+        doubled = geometry.doubled_areas(mesh.vertices, mesh.faces)
     else:
+        corners = topology.four_corners(mesh.faces)
         doubled = np.linalg.norm(geometry.quad_area_vectors(mesh.vertices, corners), axis=1)
     return np.asarray(0.5 * doubled)
 

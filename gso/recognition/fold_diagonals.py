@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gso import metrics
 from gso.geometry.vectors import lengths, unit
 from gso.mesh import Mesh, topology
 from gso.typing import Array, Flags, Ints
@@ -49,7 +50,7 @@ def fold_triangles(mesh: Mesh) -> Ints:
     turned = begun = mesh.quad_splits[quad]
     at_side = np.zeros((len(he.twin), 3))
     single = ~topology.are_quads(mesh.faces)
-    at_side[single[he.face]] = _of_triangles(mesh)[he.face[single[he.face]]]
+    at_side[single[he.face]] = metrics.face_normals(mesh)[he.face[single[he.face]]]
     folded = np.full(len(quad), -1)
     for _ in range(_ROUNDS):
         at_side[side] = np.where(turned[:, None, None], normals[1], normals[0])
@@ -107,12 +108,6 @@ def _normals(corner: Array, split: int) -> Array:
     a, b, c, d = np.roll(corner, -split, axis=1).transpose(1, 0, 2)
     one, other = unit(np.cross(b - a, c - a)), unit(np.cross(c - a, d - a))
     return np.roll(np.stack([one, one, other, other], axis=1), split, axis=1)
-
-
-def _of_triangles(mesh: Mesh) -> Array:
-    """Return the normals (m, 3) of faces by their first three corners."""
-    a, b, c = mesh.vertices[mesh.faces[:, :3]].transpose(1, 0, 2)
-    return unit(np.cross(b - a, c - a))
 
 
 def _angles(one: Array, other: Array) -> Array:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags
 
-from gso import geometry
+from gso import geometry, metrics
 from gso.linalg import spd
 from gso.mesh import Cut, Mesh
 from gso.mesh.cut import cut
@@ -137,7 +137,7 @@ class Regions:
     @cached_property
     def face_area(self) -> Array:
         """Area of each face (m,)."""
-        return 0.5 * geometry.doubled_areas(self.mesh.vertices, self.mesh.faces)
+        return metrics.face_areas(self.mesh)
 
     @cached_property
     def beside(self) -> tuple[Ints, Array]:
