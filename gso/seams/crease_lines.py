@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gso import metrics
+from gso.cut_pieces import Pieces
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
-from gso.seams.kinds import Creases, edges_between
+from gso.seams.cutting import cut
+from gso.seams.kinds import Creases, Edges, edges_between
 from gso.typing import Ints
 
 #: Angle between faces, in degrees, from which on an edge is a crease, and from which on it may be
@@ -79,3 +81,15 @@ def feature_edges(mesh: Mesh) -> tuple[Ints, int]:
     edges = np.sort(edges_between(mesh, part), axis=1)
     bodies = len(np.unique(mesh.components[mesh.used]))
     return edges[np.lexsort(edges.T[::-1])], max(int(large.sum()) - bodies, 0)
+
+
+def faces_between(mesh: Mesh, kept: Ints | None = None, most: float = np.inf) -> Pieces | None:
+    """Cut a mesh along the creases that enclose features, and along kept edges (k, 2).
+
+    None if there are no such creases, or more features than `most`, or if a piece is no disk.
+    """
+    edges, count = feature_edges(mesh)
+    if not 0 < count <= most:
+        return None
+    pieces = cut(mesh, Edges(edges if kept is None else np.concatenate([kept, edges])))
+    return pieces if all(piece.is_disk for piece in pieces) else None

@@ -15,12 +15,10 @@ from gso.mesh import Mesh
 from gso.pipeline import strains_of
 from gso.result import Result
 from gso.seams.candidates import Candidate, cuts, joined, measured, neck_of
-from gso.seams.crease_lines import feature_edges
-from gso.seams.cutting import cut
+from gso.seams.crease_lines import faces_between
 from gso.seams.edge_rows import rows_or_triangles
 from gso.seams.facets import FACETS, facet_ratio
 from gso.seams.joint_solve import solve_pieces
-from gso.seams.kinds import Edges
 from gso.seams.options import PieceSettings
 from gso.seams.scaled_search import divided_within
 from gso.seams.straight import straightened_pieces
@@ -97,13 +95,10 @@ def reshaped(
 
 def _along_creases(ground: Ground, allowed: float, settings: PieceSettings) -> list[_Attempt]:
     """Solve the pieces between the creases of a design, if seams may be anywhere."""
-    edges, others = feature_edges(ground.mesh)
-    if not others or ground.factor is not None:
+    pieces = None if ground.factor is not None else faces_between(ground.mesh, ground.kept)
+    if pieces is None:
         return []
     settings.say("seams along sharp edges")
-    pieces = cut(ground.mesh, Edges(np.concatenate([ground.kept, edges])))
-    if not all(piece.is_disk for piece in pieces):
-        return []
     return [_attempt(ground, pieces, _FIRST, 1.0, allowed, settings)]
 
 

@@ -42,7 +42,7 @@ from gso.ruled.paneling.surface_strips import (
 )
 from gso.ruled.paneling.tried_strips import FOLDED, Tried
 from gso.seams import Edges, Segmentation, cut
-from gso.seams.crease_lines import feature_edges
+from gso.seams.crease_lines import faces_between
 from gso.seams.seam_request import without_seams
 from gso.typing import Ints, MeshLike
 from gso.verdict import Reason, crosses_itself, judge, ordered
@@ -54,8 +54,8 @@ _MANY = 8
 #: Number of strips, and distance over the predicted one, from which lines do not suit a design:
 #: rulings across them twist, and pieces may be fewer.
 _SEVERAL, _TWISTED = 6, 5.0
-#: Number of faces between creases from which on these are not tried as pieces.
-_FACES = 24
+#: Largest number of features between creases that are tried as pieces.
+_FEATURES = 23
 
 
 @dataclass(frozen=True)
@@ -255,16 +255,13 @@ class StripsTask:
         if not np.array_equal(triangles, mesh.triangles):
             # Its sharp edges are diagonals of quads.
             mesh = Mesh(mesh.vertices, triangles)
-        edges, others = feature_edges(mesh)
-        if not 0 < others < _FACES:
+        faces, bound = faces_between(mesh, most=_FEATURES), asked.max_deviation or 0.0
+        if faces is None:
             return []
-        faces, bound = cut(mesh, Edges(edges)), asked.max_deviation or 0.0
         if self._lines is not None:
             few = len(faces) // FOLDED
             if self._lines.cautious(few) * self.design.diagonal <= bound:
                 return []
-        if not all(face.is_disk for face in faces):
-            return []
         asked.say("between its sharp edges")
         try:
             found = of_pieces(light, asked, faces, single=True)
