@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from itertools import pairwise
 
@@ -271,6 +272,45 @@ def test_fabricated_as_it_is(design, tmp_path):
     assert record["deviation_max"] == 0.0
     assert record["strain_max"] < 1e-12
     assert len(job.parts[0].bends) >= 2
+
+
+def turned(profile, count=48) -> Mesh:
+    """A body of revolution in triangles, one row of facets between two points of its profile."""
+    angle = 2 * np.pi * np.arange(count) / count
+    radius, height = np.transpose(profile)[:, :, None]
+    rows = np.broadcast_arrays(radius * np.cos(angle), radius * np.sin(angle), height)
+    place = np.arange(rows[0].size).reshape(rows[0].shape)
+    corners = [place, np.roll(place, -1, axis=1)]
+    a, b, c, d = corners[0][:-1], corners[1][:-1], corners[1][1:], corners[0][1:]
+    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return Mesh(np.stack(rows, axis=-1).reshape(-1, 3), faces)
+
+
+REDUCER = [(60, -100), (60, 0), (250, 500), (250, 900)]
+
+
+@pytest.mark.parametrize("way", [gso.strips, gso.pieces])
+def test_a_reducer_of_one_row_each_is_kept(way):
+    result = way(turned(REDUCER), max_deviation="1%")
+    assert result.usable
+    assert any("as it is" in note for note in result.notes)
+    assert (result.ruled.strips if way is gso.strips else len(result)) == 3
+
+
+def test_a_reducer_is_fabricated_as_cylinders_and_a_cone(tmp_path):
+    gso.fabricate(turned(REDUCER), tmp_path, workers=0)
+    (design,) = json.loads((tmp_path / "certificate.json").read_bytes())["designs"]
+    assert design["deviation_max"] == 0
+    areas = [2 * np.pi * 60 * 100, np.pi * 310 * np.hypot(190, 500), 2 * np.pi * 250 * 400]
+    assert sorted(part["area"] for part in design["parts"]) == pytest.approx(areas, rel=1e-3)
+
+
+def test_rows_of_a_lamp_globe_are_not_parts_of_their_own():
+    up = np.radians(np.linspace(-60, 60, 9))
+    globe = turned(150 * np.stack([np.cos(up), np.sin(up)], axis=-1), 40)
+    assert folded_pattern(globe) is None
+    assert folded_pattern(globe, rows=True).parts == 8
+    assert gso.strips(globe, max_deviation="1%").ruled.strips < 8
 
 
 def tray(x=80.0, y=50.0, z=15.0) -> Mesh:

@@ -105,6 +105,7 @@ def folded_pattern(
     bend_step: Length | None = None,
     unit: str = "mm",
     press_radius: tuple[float, float] | None = None,
+    rows: bool = False,
 ) -> FoldedPattern | None:
     """Unfold a design that consists of flat, rolled and conical faces.
 
@@ -129,6 +130,9 @@ def folded_pattern(
         Largest radii of cylinders that are bent by a press, at one line in the middle, where the
         surface is convex and where it is concave. Cylinders that turn by more than 180 degrees
         are rolled in any case.
+    rows : bool
+        Whether single rows of facets with smooth folds between them are cones and cylinders: they
+        may be rows of a surface that is curved both ways, too.
 
     Returns
     -------
@@ -145,7 +149,12 @@ def folded_pattern(
     (1, 5, 90.0)
     """
     shape = recognise(
-        mesh, max_deviation=max_deviation, max_strain=max_strain, bend_step=bend_step, unit=unit
+        mesh,
+        max_deviation=max_deviation,
+        max_strain=max_strain,
+        bend_step=bend_step,
+        unit=unit,
+        rows=rows,
     )
     if not shape.developable.all():
         if not is_low_poly(shape):

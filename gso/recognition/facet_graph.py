@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 _COARSEST = 2e-4
 #: Relative error of coordinates that are not rounded.
 _EXACT = 2e-9
+#: Fold, in radians, up to which a mesh can be a smooth surface: a tube of 12 sides has 30 degrees.
+SMOOTH = np.radians(30.5)
 #: Multiple of the step of the coordinates within which points count as on a surface.
 _MARGIN = 1.5
 
@@ -66,22 +68,25 @@ class FacetGraph:
         Step to which the coordinates are rounded.
     allowed : float
         Distance from its surface that a point may have besides.
+    largest_smooth : float
+        Angle, in radians, above which a fold across rulings is an edge of the design.
     """
 
     points: Array
     triangles: Ints
     step: float
     allowed: float = 0.0
+    largest_smooth: float = SMOOTH
 
     @classmethod
-    def of(cls, mesh: Mesh, allowed: float = 0.0) -> FacetGraph:
+    def of(cls, mesh: Mesh, allowed: float = 0.0, largest_smooth: float = SMOOTH) -> FacetGraph:
         """Make the graph of a mesh; distances up to `allowed` are within the tolerance, too."""
         step = coordinate_step(mesh.vertices[mesh.used])
-        return cls(mesh.vertices, fold_triangles(mesh), step, allowed)
+        return cls(mesh.vertices, fold_triangles(mesh), step, allowed, largest_smooth)
 
     def refined(self, points: Array, triangles: Ints, source: Ints) -> FacetGraph:
         """Return the graph of a refined mesh; facets are those of the triangles' sources (t2,)."""
-        new = FacetGraph(points, triangles, self.step, self.allowed)
+        new = replace(self, points=points, triangles=triangles)
         new.__dict__["facet"] = self.facet[source]
         return new
 

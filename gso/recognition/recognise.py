@@ -11,7 +11,7 @@ from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
 from gso.quantities import Length, Strain, as_length, as_strain
 from gso.recognition.bend_lines import Step, bend_step_of, lines_of_round, lines_of_strip
-from gso.recognition.facet_graph import FacetGraph
+from gso.recognition.facet_graph import SMOOTH, FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
 from gso.recognition.given_faces import GivenFaces
@@ -23,6 +23,8 @@ from gso.recognition.smooth_torsal import smooth_image
 from gso.recognition.tangent_rulings import divide_at_tangents
 from gso.typing import Array, Flags, Ints, MeshLike
 
+#: Fold, in radians, above which single rows of facets may be faces of their own.
+_ROW = np.radians(5.0)
 #: Triangles of a smooth face at least, where more than this share of the area is free.
 _FEW, _MOSTLY = 12, 0.5
 
@@ -34,6 +36,7 @@ def recognise(
     max_strain: Strain = 2e-3,
     bend_step: Length | None = None,
     unit: str = "mm",
+    rows: bool = False,
 ) -> Recognised:
     """Divide a mesh into planes, cylinders, cones, torsal surfaces and free surfaces.
 
@@ -53,6 +56,9 @@ def recognise(
         By default 2 to 15 degrees, by the radius.
     unit : str
         Unit of the coordinates.
+    rows : bool
+        Whether single rows of facets between circles are cones and cylinders, too, where the folds
+        between them are larger than 5 degrees.
 
     Returns
     -------
@@ -73,6 +79,7 @@ def recognise(
     and more than three times the upper quartile. Eight flat sides with folds of 45 degrees
     therefore stay folds, and twelve with 30 degrees are a tube. One row of facets between
     circles with smooth folds is no proof of straight rulings: a sphere consists of such rows.
+    With `rows` it is taken for a cone.
     Vertices of holes that were cut into the facets are inside the surface, by an error of chords at
     most; their places in the plane are those of the nearest points of the surface. Triangles
     across the ruling where a cylinder or cone is tangent to a plane or to a cylinder are divided
@@ -95,7 +102,7 @@ def recognise(
         else as_length(max_deviation, "max_deviation", diagonal=surface.diagonal, unit=unit)
     )
     limit = as_strain(max_strain, "max_strain")
-    graph = FacetGraph.of(surface, allowed)
+    graph = FacetGraph.of(surface, allowed, _ROW if rows else SMOOTH)
     step = bend_step_of(bend_step, surface.diagonal, unit)
     given = None if surface.attributes is None else surface.attributes.surfaces
     known = GivenFaces.of(graph, given)

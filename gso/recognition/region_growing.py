@@ -9,10 +9,10 @@ import numpy as np
 
 from gso.geometry import box_diagonal
 from gso.mesh import topology
-from gso.recognition.facet_graph import FacetGraph
+from gso.recognition.facet_graph import SMOOTH, FacetGraph
 from gso.recognition.region_members import LOOSE, members
 from gso.recognition.round_surface import RoundSurface, fit_quadrics, fit_round
-from gso.recognition.smooth_regions import SMOOTH, is_smooth
+from gso.recognition.smooth_regions import is_smooth
 from gso.typing import Array, Flags, Ints
 
 if TYPE_CHECKING:

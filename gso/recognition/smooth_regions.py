@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso.recognition.facet_graph import FacetGraph
+from gso.recognition.facet_graph import SMOOTH, FacetGraph
 from gso.recognition.region_members import APEX, TILTED, triangle_spans
 from gso.recognition.round_surface import RoundSurface
 from gso.typing import Array, Flags, Ints
 
-#: Fold, in radians, up to which a mesh can be a smooth surface: a tube of 12 sides has 30 degrees.
-SMOOTH = np.radians(30.5)
 #: Facets around the axis from which on they are a smooth surface.
 _SEVERAL = 2.5
 #: Facets around the axis from which on a region is one whatever is beside it, and multiple of the
@@ -114,7 +112,7 @@ def _has_straight_rulings(
     fold = np.abs(graph.folds[border])
     level = not only_circles
     level |= np.abs(along @ surface.axis) <= _LEVEL * length + 4 * graph.tolerance
-    smooth = across & level & (fold <= SMOOTH) & free[graph.pairs[border]].all(axis=1)
+    smooth = across & level & (fold <= graph.largest_smooth) & free[graph.pairs[border]].all(axis=1)
     return bool(length[smooth].sum() <= _INSIDE * max(length[across].sum(), 1e-300))
 
 

@@ -55,7 +55,7 @@ def divide_at_tangents(
                 regions[tangent.region].member[straddling[old] & ~inside] = True
     if len(source) > given:
         # The parts belong to the facets beside them, and more triangles are connected to regions.
-        graph = FacetGraph(graph.points, graph.triangles, graph.step, graph.allowed)
+        graph = replace(graph)
         for k, one in enumerate(regions):
             free = _free(graph, regions) | one.member
             more = members(graph, one.surface, one.member, free)

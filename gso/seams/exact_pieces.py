@@ -16,7 +16,9 @@ from gso.seams.sheets import Sheet
 from gso.typing import Ints
 
 
-def exact_pieces(design: Mesh, kept: Ints, settings: PieceSettings) -> Candidate | None:
+def exact_pieces(
+    design: Mesh, kept: Ints, settings: PieceSettings, *, rows: bool = False
+) -> Candidate | None:
     """Cut a design into the parts of its folded pattern; None if it is not developable as it is.
 
     Parameters
@@ -25,10 +27,12 @@ def exact_pieces(design: Mesh, kept: Ints, settings: PieceSettings) -> Candidate
     kept : ndarray of int, (k, 2)
         Edges that are cut in any case.
     settings : PieceSettings
+    rows : bool
+        As of :func:`gso.exact.folded_pattern`.
     """
     try:
         found = folded_pattern(
-            design, max_strain=settings.max_strain, cut=kept, sheet=settings.max_size
+            design, max_strain=settings.max_strain, cut=kept, sheet=settings.max_size, rows=rows
         )
     except (MeshError, OptionError):
         # Facets of round faces do not fit together, or a face is larger than the sheet.

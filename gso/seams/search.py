@@ -223,11 +223,9 @@ def pieces(
     free = not len(kept) and factor is None
     body = _turned(design, settings.max_deviation) if symmetric is True and free else None
     out = None
-    if as_it_is and factor is None and (body is not None or not symmetric):
-        found = exact_pieces(design, kept, settings)
-        if found is not None:
-            out = packed(found, None, design, kept, settings)
-            out = replace(out, notes=(*out.notes, exact.as_it_is(found.strain)))
+    stays = as_it_is and factor is None and (body is not None or not symmetric)
+    if stays:
+        out = _exact(design, kept, settings)
     if out is None or not (out.usable or crosses_itself(out.reasons)):
         try:
             other = None if body is None else in_gores(design, body, settings)
@@ -235,11 +233,31 @@ def pieces(
                 other = _searched(design, kept, factor, bool(symmetric), settings, workers)
                 if free and not symmetric:
                     other = _advised(other, design, settings.max_deviation)
+            if stays and out is None:
+                in_rows = _exact(design, kept, settings, rows=True)
+                if in_rows is not None and _is_better(in_rows, other):
+                    other = in_rows
             out = other if out is None or other.usable else out
         except GSOError:
             if out is None:
                 raise
     return replace(out, notes=(*said, *out.notes), seconds=time.perf_counter() - clock)
+
+
+def _exact(
+    design: Mesh, kept: Ints, settings: PieceSettings, *, rows: bool = False
+) -> Segmentation | None:
+    """Return the parts of a design that is developable as it is."""
+    found = exact_pieces(design, kept, settings, rows=rows)
+    if found is None:
+        return None
+    out = packed(found, None, design, kept, settings)
+    return replace(out, notes=(*out.notes, exact.as_it_is(found.strain)))
+
+
+def _is_better(exact: Segmentation, other: Segmentation) -> bool:
+    """Whether exact pieces can be used, and are no more than others, if these can be."""
+    return exact.usable and (len(exact) <= len(other) or not other.usable)
 
 
 def _turned(design: Mesh, distance: float | None) -> Revolution | None:

@@ -74,19 +74,33 @@ def made(
             f"{given.name}: the sheet of {given.sheet:.6g} is not developable, or a face is larger "
             "than the sheets to cut it from"
         )
+    in_rows = None
+    if exact is None and stays and not settings.symmetric:
+        in_rows = _exact(given, settings, rows=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
-        # Parts have other vertices, and a plane of symmetry of their own.
-        if exact is None and not (settings.symmetric or given.constraints):
-            exact = _mixed(given, settings, named, workers)
-            if exact is not None and not exact.reasons:
-                return exact
-        try:
-            other = _changed(given, settings, named, workers)
-        except GSOError:
-            if exact is None:
-                raise
+        other = _divided(given, settings, named, workers, exact)
+    if in_rows is None or in_rows.reasons:
+        return other
+    # Rows of a surface that is curved both ways are cones, too, but more than its strips.
+    return in_rows if other.reasons or len(in_rows.panels) <= len(other.panels) else other
+
+
+def _divided(
+    given: Design, settings: FabricationSettings, say: Say, workers: int | None, exact: Made | None
+) -> Made:
+    """Make a design of panels that are kept, changed or both, unless the exact ones are better."""
+    # Parts have other vertices, and a plane of symmetry of their own.
+    if exact is None and not (settings.symmetric or given.constraints):
+        exact = _mixed(given, settings, say, workers)
+        if exact is not None and not exact.reasons:
             return exact
+    try:
+        other = _changed(given, settings, say, workers)
+    except GSOError:
+        if exact is None:
+            raise
+        return exact
     return other if exact is None or not other.reasons else exact
 
 
@@ -159,7 +173,7 @@ def _without_poles(given: Design) -> Design:
     return replace(given, mesh=joined, avoid=avoid, **ends)
 
 
-def _exact(given: Design, settings: FabricationSettings) -> Made | None:
+def _exact(given: Design, settings: FabricationSettings, *, rows: bool = False) -> Made | None:
     """Unfold a design that is flat or developable as it is; None if it is not."""
     thick = given.sheet
     try:
@@ -174,6 +188,7 @@ def _exact(given: Design, settings: FabricationSettings) -> Made | None:
             bend_step=settings.bend_step,
             unit=settings.unit,
             press_radius=_press_radius(given, settings),
+            rows=rows,
         )
     except OptionError:
         # A face is larger than the sheet.

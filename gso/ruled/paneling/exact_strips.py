@@ -21,7 +21,9 @@ from gso.status import Status
 from gso.typing import Ints
 
 
-def exact_strips(design: Mesh, request: StripsRequest, kept: Ints) -> StripsResult | None:
+def exact_strips(
+    design: Mesh, request: StripsRequest, kept: Ints, *, rows: bool = False
+) -> StripsResult | None:
     """Return a design with its own rulings and folds, without a verdict.
 
     Parameters
@@ -32,6 +34,8 @@ def exact_strips(design: Mesh, request: StripsRequest, kept: Ints) -> StripsResu
         Without constraints, start, and number of strips.
     kept : ndarray of int, (k, 2)
         Edges that are cut in any case.
+    rows : bool
+        As of :func:`gso.exact.folded_pattern`.
 
     Returns
     -------
@@ -40,7 +44,9 @@ def exact_strips(design: Mesh, request: StripsRequest, kept: Ints) -> StripsResu
     """
     clock = time.perf_counter()
     try:
-        found = folded_pattern(design, max_strain=request.max_strain, cut=kept, sheet=request.sheet)
+        found = folded_pattern(
+            design, max_strain=request.max_strain, cut=kept, sheet=request.sheet, rows=rows
+        )
     except OptionError:
         # A face is larger than the sheet.
         return None

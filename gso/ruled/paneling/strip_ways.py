@@ -208,7 +208,7 @@ class StripsTask:
 
     def _answer(self, tried: Sequence[Tried]) -> Result:
         few = self.request.options.number is None
-        best = min(tried, key=lambda one: one.order(few=few))
+        best = min([*tried, *self._in_rows(tried)], key=lambda one: one.order(few=few))
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         best.result.notes += shop_notes(best.result)
@@ -272,9 +272,22 @@ class StripsTask:
     @cached_property
     def _exact(self) -> StripsResult | None:
         """The design as it is, if it is developable and may be kept."""
+        return self._kept_as_it_is()
+
+    def _kept_as_it_is(self, *, rows: bool = False) -> StripsResult | None:
         if self.kept is None or not self.request.may_keep_design:
             return None
-        return exact_strips(self.design, self.request, self.kept)
+        return exact_strips(self.design, self.request, self.kept, rows=rows)
+
+    def _in_rows(self, tried: Sequence[Tried]) -> list[Tried]:
+        """Return the design, if each of its rows of facets is a cone or cylinder.
+
+        Rows of a surface that is curved both ways are cones, too, but more than other strips.
+        """
+        if self._exact is not None or not self._counted or any(one.ended for one in tried):
+            return []
+        result = self._kept_as_it_is(rows=True)
+        return [] if result is None else [self._judged(result)]
 
     def _judged(self, result: StripsResult) -> Tried:
         reasons = [*judge(result, self.request.limits), *against_parts(result, self.request)]
