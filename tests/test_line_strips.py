@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import gso
+from gso import faults, metrics
 from gso.mesh import Mesh
 from gso.ruled.lines import LineStrips, families
 from gso.ruled.solve import Wanted
@@ -225,6 +226,30 @@ def test_files_keep_strips_along_lines(tmp_path):
     assert again.metrics == pytest.approx(result.metrics)
     result.save(tmp_path / "a.obj")
     assert len(gso.as_mesh(tmp_path / "a.obj").vertices) == len(result.mesh.vertices)
+
+
+def ramp(turns, rows=5, around=40):
+    """A ramp that winds around a cone, and is curved across a little."""
+    u, v = np.linspace(0, 1, rows)[:, None], np.linspace(0, turns, int(around * turns) + 1)[None]
+    r, turn = 9.0 + 3.5 * u - 1.2 * v, 2 * np.pi * v
+    return np.stack(
+        np.broadcast_arrays(r * np.cos(turn), r * np.sin(turn), 11 * v + 1.2 * u**2), axis=-1
+    )
+
+
+def test_a_strip_that_winds_around_an_axis_is_divided_across():
+    half = gso.strips(ramp(0.8), max_deviation="1%")
+    assert half.usable and half.ruled.strips == 1
+    assert not any("divided across" in note for note in half.notes)
+    result = gso.strips(ramp(2.2), max_deviation="1%")
+    assert result.usable and result.ruled.strips == result.details["strips"] == 3
+    assert any("divided across" in note for note in result.notes)
+    assert not faults.overlaps(result.pattern.surface(result.mesh), result.pattern.flat).size
+    # Joints are no bends.
+    seams = result.mesh.vertices[result.pattern.vertex[result.pattern.seams[:, 0]]]
+    assert len(seams) and result.ruled.creases.largest_angle < np.radians(5)
+    areas = np.bincount(result.ruled.strip, metrics.face_areas(result.mesh))
+    assert areas.max() < 1.5 * areas.min()
 
 
 def test_as_few_strips_as_hold_a_distance():

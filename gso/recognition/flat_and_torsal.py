@@ -8,8 +8,7 @@ import numpy as np
 
 from gso.geometry.vectors import unit
 from gso.mesh import topology
-from gso.recognition.facet_graph import FacetGraph
-from gso.recognition.smooth_regions import SMOOTH
+from gso.recognition.facet_graph import SMOOTH, FacetGraph
 from gso.typing import Array, Flags, Ints
 
 #: Facets from which on a strip is a smooth surface and no polyhedron.

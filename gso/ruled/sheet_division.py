@@ -1,4 +1,4 @@
-"""Strips that are longer than a sheet, divided across.
+"""Strips that are longer than a sheet, or overlap themselves in the plane, divided across.
 
 Joints are along rulings or between two of them. Where their parts do not fit, joints run straight
 across the strip.
@@ -6,12 +6,15 @@ across the strip.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from gso import faults, metrics
+from gso.errors import MeshError
+from gso.geometry.ears import divided
 from gso.geometry.polygon import points_at
 from gso.geometry.vectors import lengths
 from gso.mesh import Mesh, topology
@@ -23,12 +26,18 @@ from gso.typing import Array, Ints
 
 #: Share of the distance between two rulings up to which a joint is moved to one of them.
 _NEAR = 0.1
+#: Parts at most of a strip that overlaps itself.
+_PARTS = 12
 #: Places, in widths of the strip, at which a joint across is tried.
 _SHIFTS = (-0.03, -0.02, -0.01, 0.0, 0.01, 0.02, 0.03)
 
 
+#: Whether a part of a pattern is as it should be: its vertices (n, 2) and polygons.
+Fits = Callable[[Array, Sequence[Ints]], bool]
+
+
 def divided_to_fit(
-    surface: RuledSurface, design: Mesh, fits: Callable[[Array], bool]
+    surface: RuledSurface, design: Mesh, fits: Fits, most: int | None = None
 ) -> tuple[RuledSurface, Ints]:
     """Divide the strips that do not fit a sheet across, each into parts of equal length.
 
@@ -41,7 +50,10 @@ def divided_to_fit(
     design : Mesh
         What it is near.
     fits : callable
-        Takes the vertices (k, 2) of a part of the pattern, and tells whether it fits.
+        Takes the vertices (n, 2) of a pattern and the polygons of a part of it, as numbers of
+        vertices, and tells whether that fits.
+    most : int, optional
+        Largest number of parts of a strip.
 
     Returns
     -------
@@ -57,11 +69,47 @@ def divided_to_fit(
     joints: list[_Joint] = []
     for part in range(int(strips.part.max()) + 1):
         cells = np.flatnonzero(strips.part == part)
-        flat = surface.pattern.flat[np.concatenate([strips.rings[c] for c in cells])]
-        if not fits(flat):
-            joints += strips.divided(cells, fits)
+        if not fits(surface.pattern.flat, [strips.rings[c] for c in cells]):
+            joints += strips.divided(cells, fits, most)
     faces = strips.face[[joint.strip for joint in joints]]
     return (strips.joined(joints, design) if joints else surface), faces
+
+
+def without_overlaps(surface: RuledSurface, design: Mesh) -> RuledSurface:
+    """Divide the strips that overlap themselves in the plane across, such as those of spirals.
+
+    Parameters
+    ----------
+    surface : RuledSurface
+    design : Mesh
+        What it is near.
+
+    Returns
+    -------
+    RuledSurface
+        As of :func:`divided_to_fit`. The same object where it is not sound otherwise, and where
+        strips would be divided into many parts.
+    """
+    pattern = surface.pattern
+    sheet = pattern.surface(surface.mesh)
+    if (
+        surface.sound
+        or surface.crossed
+        or metrics.flipped_faces(sheet, pattern.flat).size
+        or faults.folded(surface.mesh).size
+        or faults.crossings(surface.mesh).size
+    ):
+        return surface
+
+    def fits(flat: Array, rings: Sequence[Ints]) -> bool:
+        triangles = divided(list(rings), np.pad(flat, ((0, 0), (0, 1))))[0]
+        return not faults.overlaps(Mesh(np.pad(flat, ((0, 0), (0, 1))), triangles), flat).size
+
+    try:
+        return divided_to_fit(surface, design, fits, most=_PARTS)[0]
+    except MeshError:
+        # A joint leaves faces without area.
+        return surface
 
 
 #: A vertex of a pattern, or a place between two: both, and the share of the way.
@@ -154,7 +202,7 @@ class _Strips:
         part = np.unique(part[first], return_inverse=True)[1]
         return cls(surface, rings, first, part, pairs, ends)
 
-    def divided(self, cells: Ints, fits: Callable[[Array], bool]) -> list[_Joint]:
+    def divided(self, cells: Ints, fits: Fits, most: int | None) -> list[_Joint]:
         """Return the joints of one strip: as few as there can be; none where nothing fits."""
         order = _in_order(self.pairs, cells)
         if order is None:
@@ -168,12 +216,12 @@ class _Strips:
         ]
         at = ends[0] + np.cumsum(np.r_[0.0, lengths(np.diff(middle, axis=0))])
         whole = float(at[-1]) + ends[1]
-        for count in range(2, 2 * len(path) + 1):
+        for count in range(2, 1 + (2 * len(path) if most is None else most)):
             wanted = (whole * np.arange(1, count) / count).tolist()
             for way in (self._joint, self._across):
                 found = dict.fromkeys(way(hinges, path, at, place) for place in wanted)
                 joints = [joint for joint in found if joint is not None]
-                if joints and all(fits(part) for part in self._parts(path, joints)):
+                if joints and all(fits(*part) for part in self._parts(path, joints)):
                     return joints
         return []
 
@@ -269,8 +317,8 @@ class _Strips:
         two = _along(flat, ring[mid + 1 :], 1.0 - share)
         return _Joint(cell, ((cell, one, two),))
 
-    def _parts(self, path: Ints, joints: list[_Joint]) -> list[Array]:
-        """Return the vertices (k, 2) of the parts between joints of a strip."""
+    def _parts(self, path: Ints, joints: list[_Joint]) -> list[tuple[Array, list[Ints]]]:
+        """Return the vertices (n, 2) and the polygons of the parts between joints of a strip."""
         flat = self.surface.pattern.flat
         nodes = _Nodes(flat, {int(c): self.rings[c].tolist() for c in path})
         rings, lines = nodes.divided(np.arange(len(flat)), joints)
@@ -285,7 +333,7 @@ class _Strips:
         label = topology.label_components(len(rings), one, two)
         points = np.array(nodes.points)
         return [
-            points[np.concatenate([rings[k] for k in np.flatnonzero(label == part)])]
+            (points, [np.array(rings[k]) for k in np.flatnonzero(label == part)])
             for part in np.unique(label)
         ]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from gso.ruled.descent import Stopped, Tell
 from gso.ruled.domain import Domain
 from gso.ruled.extended import Extended
 from gso.ruled.ruled_surface import RuledSurface, built
+from gso.ruled.sheet_division import without_overlaps
 from gso.ruled.strip_fit import Fit, Job, evened, halved, refined, single
 from gso.typing import Array, Ints
 
@@ -94,11 +95,14 @@ class Found:
         Mean distance, the larger of both directions.
     start : str
         Name of the normals that the first rulings came from.
+    divided : bool
+        Whether strips are divided across, as they overlap themselves in the plane otherwise.
     """
 
     surface: RuledSurface
     mean: float
     start: str
+    divided: bool = False
 
     @classmethod
     def of(cls, surface: RuledSurface, start: str) -> Found:
@@ -248,8 +252,11 @@ class _Search:
 
     def _found(self, job: Job, fit: Fit, start: str) -> Found:
         """Lower the largest distance of a fit, and measure the surface that it is."""
-        surface = built(job, evened(job, fit)).measured(job.target.domain.mesh)
-        return Found.of(surface, start)
+        design = job.target.domain.mesh
+        whole = surface = built(job, evened(job, fit))
+        if job.conditions.mirror is None:
+            surface = without_overlaps(whole, design)
+        return replace(Found.of(surface.measured(design), start), divided=surface is not whole)
 
 
 def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:

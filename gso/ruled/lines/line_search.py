@@ -19,6 +19,7 @@ from gso.ruled.lines.line_surface import line_surface
 from gso.ruled.lines.line_twist import alignment
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.lines.strip_cells import Cells
+from gso.ruled.sheet_division import without_overlaps
 from gso.ruled.solve import Found, Wanted
 from gso.typing import Array, Ints
 
@@ -311,10 +312,14 @@ class LineStrips:
                 low = count
                 more = max(count + 1, round(_MORE * count))
                 count = min(more, most) if high is None else (low + high) // 2
+        if least == high and self.results[least].divided:
+            # Each strip of a spiral becomes several parts, so that one is of use.
+            self._solve(1, aim)
         every = sorted(k for k in self.results if k <= most)
-        met = next((k for k in every if self._meets(wanted, k)), None)
-        best = min(every, key=lambda k: _distance(self.results[k]), default=met)
-        best = best if met is None else met
+        met = [k for k in every if self._meets(wanted, k)]
+        if met:
+            return self._certain(min(met, key=lambda k: self.results[k].surface.strips))
+        best = min(every, key=lambda k: _distance(self.results[k]), default=None)
         return None if best is None else self._certain(best)
 
     def _meets(self, wanted: Wanted, count: int) -> bool:
@@ -349,11 +354,13 @@ class LineStrips:
         if not np.isfinite(points).all():
             return None
         try:
-            surface = line_surface(self.mesh, polygons, points, ends)
+            whole = line_surface(self.mesh, polygons, points, ends)
         except MeshError:
             # Corners that run together leave faces without area.
             return None
-        return Found.of(surface.measured(self.mesh, sampled=True), LINES)
+        surface = without_overlaps(whole, self.mesh)
+        found = Found.of(surface.measured(self.mesh, sampled=True), LINES)
+        return replace(found, divided=surface is not whole)
 
     def _fitter(self, mesh: Mesh) -> LineFitter:
         """Return what fits strips along the lines of a mesh."""

@@ -17,7 +17,7 @@ from gso.ruled.sheet_division import divided_to_fit
 from gso.seams import Sheet
 from gso.seams.sheets import too_small
 from gso.status import Status
-from gso.typing import Array
+from gso.typing import Array, Ints
 from gso.verdict import Code, Measurement, Reason, compare
 
 Narrow = Callable[[float, int | None], Result | None]
@@ -85,8 +85,8 @@ def divided(result: Result, request: StripsRequest) -> Result:
     if isinstance(before, list) and 0 in before:
         return result
 
-    def fits(flat: Array) -> bool:
-        return not _too_large([flat], sheet)
+    def fits(flat: Array, rings: Sequence[Ints]) -> bool:
+        return not _too_large([flat[np.concatenate(rings)]], sheet)
 
     surface, faces = divided_to_fit(result.ruled, result.design, fits)
     if surface is result.ruled:

@@ -35,6 +35,8 @@ from gso.typing import Array
 _OFF = 25.0
 #: Distance of vertices from their places, relative to the diagonal, that counts as zero.
 _SAME = 1e-9
+#: Note on strips of spirals.
+_DIVIDED = ("strips are divided across, so that no part overlaps itself in the plane",)
 #: Radius that the solve keeps, relative to the smallest one.
 _SAFE = 1.6
 
@@ -154,7 +156,7 @@ def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Res
         seconds=run.timings.as_dict() | {"strips": time.perf_counter() - clock},
         backend=begun.backend,
         warm_start="cold" if request.start.points is None else request.start.source,
-        notes=design.notes,
+        notes=design.notes + (_DIVIDED if found.divided else ()),
         details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
         **StripsResult.attributes(surface),
     )
@@ -273,7 +275,7 @@ def along_lines(
         seconds={"strips": time.perf_counter() - clock},
         backend="",
         warm_start="cold",
-        notes=design.notes + _off(lines, request),
+        notes=design.notes + _off(lines, request) + (_DIVIDED if found.divided else ()),
         details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
         **StripsResult.attributes(surface),
     )
