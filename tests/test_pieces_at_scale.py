@@ -5,6 +5,7 @@ import pytest
 
 import gso
 from gso import metrics
+from gso.errors import MeshError, OptionError
 from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
 from gso.seams import CoarseCopy, Creases, Regions, RemainingTime, Segmentation, Slice
@@ -70,6 +71,15 @@ class TestTheCopy:
         np.testing.assert_allclose(ends[..., 0], 0.0, atol=1e-12)
         length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
         assert length == pytest.approx(2.0)
+
+
+def test_a_search_ends_where_its_pieces_are_not_fewer():
+    mesh, said = ball(33), []
+    with pytest.raises(MeshError, match="not be fewer than 1"):
+        gso.pieces(mesh, max_deviation="0.5%", fewer_than=1, workers=0, callback=said.append)
+    assert not any("design's own" in text for text in said)
+    with pytest.raises(OptionError, match="fewer_than is 0"):
+        gso.pieces(mesh, max_deviation="0.5%", fewer_than=0)
 
 
 def seam_edges(mesh: Mesh, label: np.ndarray) -> np.ndarray:

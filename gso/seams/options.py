@@ -87,16 +87,18 @@ class PieceSettings:
     say: Callable[[str], None]
     effort: Effort = EFFORTS["standard"]
     executor: Executor = SERIAL
+    fewer_than: int | None = None
 
     def __post_init__(self) -> None:
         if self.seam is not None:
             as_positive(self.seam, "seam")
         if not callable(self.say):
             raise OptionError(f"callback is {self.say!r}; it must be a function of a text")
-        count = self.max_pieces
-        whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
-        if count is not None and not (whole and count >= 1):
-            raise OptionError(f"max_pieces is {count!r}; it must be a whole number from 1 up")
+        for name in ("max_pieces", "fewer_than"):
+            count = getattr(self, name)
+            whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+            if count is not None and not (whole and count >= 1):
+                raise OptionError(f"{name} is {count!r}; it must be a whole number from 1 up")
         size = self.max_size
         if size is not None and self.min_size is not None and self.min_size > max(size):
             raise OptionError(

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gso.errors import MeshError
 from gso.geometry.plane import Plane
 from gso.mesh import Mesh
 from gso.seams.budgets import Budgets
@@ -65,6 +66,8 @@ _IN_ALL, _LEAST_WAYS = 150, 2
 #: Number of pieces, and share of the area in those that do not hold, relative to that with bounds
 #: before, from which on no lower bound is tried.
 _MANY_AT_FIRST, _NO_BETTER = 20, 0.9
+#: Number of pieces over those that are too many from which on merging them does not help.
+_MERGED = 1.5
 #: How often these are solved again where they nearly hold.
 _REPAIRS = 3
 #: Share of a region's area that two regions have in common which are the same.
@@ -137,6 +140,7 @@ def _of_copy(search: CopySearch) -> list[Trial]:
         # Other bounds may take as many solves as those before.
         others = (len(LEVELS) - number) * max(len(found) // max(number - 1, 1), 1)
         fewest = int(labels[0].max()) + 1 if labels else 1
+        _check_fewer(search, fewest)
         ways = max(_LEAST_WAYS, min(effort.variants, _IN_ALL // fewest))
         some = _first(search, labels[:ways], others)
         if some and not some[-1].holds:
@@ -164,6 +168,13 @@ def _of_copy(search: CopySearch) -> list[Trial]:
     merges.run(effort.merges)
     merges.meet(effort.budgets)
     return merges.found
+
+
+def _check_fewer(search: CopySearch, fewest: int) -> None:
+    """Raise a MeshError if so many pieces, of divisions that are tried next, will stay too many."""
+    most = search.settings.fewer_than
+    if most is not None and fewest > _MERGED * most:
+        raise MeshError(f"the pieces will not be fewer than {most}: divisions begin with {fewest}")
 
 
 def _known(label: Ints, found: list[Trial]) -> bool:

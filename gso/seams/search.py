@@ -68,6 +68,7 @@ def pieces(
     max_strain: Strain | None = None,
     max_deviation: Length | None = None,
     max_pieces: int | None = None,
+    fewer_than: int | None = None,
     seam: float | None = None,
     darts: bool = False,
     symmetric: bool | str = False,
@@ -110,6 +111,9 @@ def pieces(
         text such as "5mm" or "0.5%" (of the diagonal of the bounding box).
     max_pieces : int, optional
         Budget of pieces.
+    fewer_than : int, optional
+        Number of parts that there are without this search. It ends early where the shape of a mesh
+        of 1,000 vertices or more may change and the pieces will not be fewer.
     seam : float, optional
         Budget of the length of all seams, relative to the root of the design's area.
     darts : bool
@@ -166,7 +170,8 @@ def pieces(
     ------
     MeshError
         The mesh cannot be read or used: coordinates that are not finite, faces without area, faces
-        that are there twice, vertices on edges of other faces.
+        that are there twice, vertices on edges of other faces. Or the pieces will not be fewer
+        than `fewer_than`.
     OptionError
         A parameter is wrong.
 
@@ -207,6 +212,7 @@ def pieces(
         max_strain=default if max_strain is None else as_strain(max_strain, "max_strain"),
         max_deviation=length(max_deviation, "max_deviation"),
         max_pieces=max_pieces,
+        fewer_than=fewer_than,
         seam=seam,
         darts=darts,
         min_neck=length(min_neck, "min_neck"),

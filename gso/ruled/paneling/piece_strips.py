@@ -221,19 +221,29 @@ def _candidates(
         yield strips, True
 
 
-def found_pieces(light: LightDesign, request: StripsRequest) -> Segmentation:
+def found_pieces(
+    light: LightDesign, request: StripsRequest, fewer_than: int | None = None
+) -> Segmentation:
     """Search for seams without darts, and leave strips of the pieces some of the distance.
+
+    Parameters
+    ----------
+    light : LightDesign
+    request : StripsRequest
+    fewer_than : int, optional
+        Number of strips that there are without them.
 
     Raises
     ------
     MeshError
-        A piece cannot be laid flat.
+        A piece cannot be laid flat, or pieces will not be fewer.
     """
     mesh = request.seams.searched(light.mesh, light.allowed)
     found = search(
         mesh,
         max_strain=request.max_strain,
         max_deviation=None if light.allowed is None else JOINT * light.allowed,
+        fewer_than=fewer_than,
         darts=False,
         # All lengths are in the design's unit, whatever that is.
         sheet=request.sheet,

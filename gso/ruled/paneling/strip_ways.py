@@ -138,7 +138,7 @@ class StripsTask:
             asked.seams.check_symmetric(light.mesh, light.allowed)
         failed: GSOError | None = None
         try:
-            divisions = self._divisions(light)
+            divisions = self._divisions(light, tried)
         except GSOError as error:
             divisions, failed = [], error
         for in_pieces in divisions:
@@ -187,13 +187,19 @@ class StripsTask:
         asked = self.request
         return asked.options.number is None and asked.max_deviation is not None
 
-    def _divisions(self, light: LightDesign) -> list[Callable[[Sequence[Tried]], Tried]]:
+    def _divisions(
+        self, light: LightDesign, tried: Sequence[Tried]
+    ) -> list[Callable[[Sequence[Tried]], Tried]]:
         """Return the ways to make strips of the pieces that are given, or that are found."""
         asked, given = self.request, self.division
         if given is not None:
             own = LightDesign(self.design, self.design, asked.max_deviation)
             return [lambda tried: self._judged_pieces(*of_pieces(own, asked, given))]
-        found = found_pieces(light, asked)
+        # Pieces are one strip each at least.
+        held = [one.strips for one in tried if one.holds]
+        found = found_pieces(light, asked, min(held, default=None))
+        if held and not found.usable:
+            return []
 
         def as_found(tried: Sequence[Tried]) -> Tried:
             return self._judged_pieces(*of_found(light, asked, found))
