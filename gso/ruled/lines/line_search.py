@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gso import metrics
+from gso import faults, metrics
 from gso.errors import MeshError
 from gso.mesh import Mesh
 from gso.ruled.lines.free_rulings import free_rulings, single
@@ -58,6 +58,9 @@ _SAME = 1e-7
 EXACT = 1e-5
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
+#: Solves within the distance whose strips are all pleated, the last one no less, after which the
+#: search ends.
+_PLEATED = 3
 #: Solves without any sound strips after which the search ends.
 _FOLDED = 3
 
@@ -297,6 +300,7 @@ class LineStrips:
         aim = np.inf if wanted.max_deviation is None else wanted.max_deviation
         count = next((k for k in range(low + 1, most + 1) if self.predicted(k) <= aim), most)
         hopeless = 0
+        pleated: list[float] = []
         for _ in range(_SOLVES):
             if not low < count <= most or self.stopped:
                 break
@@ -304,6 +308,11 @@ class LineStrips:
             if not any(one.surface.sound for one in self.results.values()):
                 hopeless += 1
                 if hopeless == _FOLDED:
+                    break
+            if count in self.results and self.results[count].surface.farthest <= aim:
+                pleated.append(self.results[count].surface.pleat_max)
+                if len(pleated) >= _PLEATED and pleated[-1] >= min(pleated[:-1]) > faults.PLEATED:
+                    # The design itself has teeth, which more strips follow.
                     break
             if self._meets(wanted, count):
                 high = count
