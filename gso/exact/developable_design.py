@@ -26,6 +26,8 @@ from gso.wording import percent
 EXACT = 1e-6
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7
+#: Number of faces from which on no mesh consists of single rows of facets.
+_FINE = 20_000
 #: Angle between normals at both ends of an edge, in radians, up to which it is along a ruling.
 _TURNED = 1e-3
 
@@ -132,7 +134,8 @@ def folded_pattern(
         are rolled in any case.
     rows : bool
         Whether single rows of facets with smooth folds between them are cones and cylinders: they
-        may be rows of a surface that is curved both ways, too.
+        may be rows of a surface that is curved both ways, too. Not in meshes of more than 20,000
+        faces, which are not that coarse.
 
     Returns
     -------
@@ -148,6 +151,8 @@ def folded_pattern(
     >>> found.parts, len(found.folded.edges), float(np.degrees(found.folded.angles).round(6).max())
     (1, 5, 90.0)
     """
+    if rows and len(mesh.faces) > _FINE:
+        return None
     shape = recognise(
         mesh,
         max_deviation=max_deviation,

@@ -74,16 +74,16 @@ def made(
             f"{given.name}: the sheet of {given.sheet:.6g} is not developable, or a face is larger "
             "than the sheets to cut it from"
         )
-    in_rows = None
-    if exact is None and stays and not settings.symmetric:
-        in_rows = _exact(given, settings, rows=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         other = _divided(given, settings, named, workers, exact)
-    if in_rows is None or in_rows.reasons:
+    if exact is not None or not stays or settings.symmetric:
         return other
     # Rows of a surface that is curved both ways are cones, too, but more than its strips.
-    return in_rows if other.reasons or len(in_rows.panels) <= len(other.panels) else other
+    rows = _exact(given, settings, rows=True)
+    if rows is None or rows.reasons:
+        return other
+    return rows if other.reasons or len(rows.panels) <= len(other.panels) else other
 
 
 def _divided(
