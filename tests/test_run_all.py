@@ -271,8 +271,13 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("known", methods().values(), ids=lambda m: f"{m.task} {m.name}")
 def test_pieces_follow_the_code_of_the_method_and_of_its_measures(known, monkeypatch):
-    asked = []
-    monkeypatch.setattr(store, "source", lambda *paths: asked.extend(p.name for p in paths))
+    asked, source = [], store.source
+
+    def noted(*paths):
+        asked.extend(path.name for path in paths)
+        return source(*paths)
+
+    monkeypatch.setattr(store, "source", noted)
     if known.absent():
         pytest.skip(known.absent())
     known.key(quality.levels(known.task)[0])
