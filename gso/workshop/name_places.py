@@ -68,8 +68,10 @@ def _between(
     """Find a place between bend lines, the nearest to a point; None if there is none."""
     import shapely
 
-    lines = shapely.MultiLineString([bend.line for bend in part.bends])
-    free = shapely.get_parts(without(shape, lines.buffer(_BESIDE * _LEAST * height)))
+    # Together, lines that meet at the apex of a cone would take seconds.
+    lines = shapely.linestrings([bend.line for bend in part.bends])
+    beside = shapely.union_all(shapely.buffer(lines, _BESIDE * _LEAST * height))
+    free = shapely.get_parts(without(shape, beside))
     least = (_LEAST * height) ** 2 * _LETTER * max(len(text), 1)
     free = free[(shapely.get_type_id(free) == 3) & (shapely.area(free) >= least)]
     free = free[np.argsort(shapely.distance(free, shapely.Point(near)), kind="stable")][:_CELLS]

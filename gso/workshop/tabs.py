@@ -243,8 +243,8 @@ def room(glued: Part, piece: Array, there: Array, slack: float) -> Geometry:
     shape = region(glued.outline, glued.holes)
     folds = [shapely.LineString(bend.line) for bend in _sharp(glued)]
     if folds:
-        cut = shapely.buffer(shapely.MultiLineString(folds), _CUT, cap_style="square")
-        shape = without(shape, cut)
+        cut = shapely.buffer(folds, _CUT, cap_style="square")
+        shape = without(shape, shapely.union_all(cut))
     faces = shapely.get_parts(shape)
     middle = shapely.LineString(_inner(there))
     shape = shapely.GeometryCollection(faces[shapely.distance(faces, middle) < _NEAR].tolist())
