@@ -58,9 +58,9 @@ _SAME = 1e-7
 EXACT = 1e-5
 #: Ratio of numbers of strips in the search for a bound, and largest number of solves.
 _MORE, _SOLVES = 1.3, 10
-#: Solves within the distance whose strips are all pleated, the last one no less, after which the
-#: search ends.
-_PLEATED = 3
+#: Solves within the distance, in a row, whose strips are pleated and no less than before, after
+#: which the search ends.
+_PLEATED = 2
 #: Solves without any sound strips after which the search ends.
 _FOLDED = 3
 
@@ -311,7 +311,8 @@ class LineStrips:
                     break
             if count in self.results and self.results[count].surface.farthest <= aim:
                 pleated.append(self.results[count].surface.pleat_max)
-                if len(pleated) >= _PLEATED and pleated[-1] >= min(pleated[:-1]) > faults.PLEATED:
+                best, since = min(pleated), pleated[::-1].index(min(pleated))
+                if best > faults.PLEATED and since >= _PLEATED:
                     # The design itself has teeth, which more strips follow.
                     break
             if self._meets(wanted, count):
