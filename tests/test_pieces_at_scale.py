@@ -5,7 +5,6 @@ import pytest
 
 import gso
 from gso import metrics
-from gso.errors import MeshError, OptionError
 from gso.hierarchy import thinned
 from gso.mesh import Mesh, Nearest
 from gso.seams import CoarseCopy, Creases, Regions, RemainingTime, Segmentation, Slice
@@ -75,10 +74,10 @@ class TestTheCopy:
 
 def test_a_search_ends_where_its_pieces_are_not_fewer():
     mesh, said = ball(33), []
-    with pytest.raises(MeshError, match="not be fewer than 1"):
+    with pytest.raises(gso.MeshError, match="not be fewer than 1"):
         gso.pieces(mesh, max_deviation="0.5%", fewer_than=1, workers=0, callback=said.append)
     assert not any("design's own" in text for text in said)
-    with pytest.raises(OptionError, match="fewer_than is 0"):
+    with pytest.raises(gso.OptionError, match="fewer_than is 0"):
         gso.pieces(mesh, max_deviation="0.5%", fewer_than=0)
 
 
