@@ -311,8 +311,9 @@ class LineStrips:
                     break
             if count in self.results and self.results[count].surface.farthest <= aim:
                 pleated.append(self.results[count].surface.pleat_max)
-                best, since = min(pleated), pleated[::-1].index(min(pleated))
-                if best > faults.PLEATED and since >= _PLEATED:
+                least_pleat = min(pleated)
+                since = pleated[::-1].index(least_pleat)
+                if least_pleat > faults.PLEATED and since >= _PLEATED:
                     # The design itself has teeth, which more strips follow.
                     break
             if self._meets(wanted, count):
