@@ -119,12 +119,22 @@ class RuledSurface:
     @cached_property
     def sound(self) -> bool:
         """Whether neither surface nor pattern is folded or meets itself, and no rulings cross."""
+        return not self.overlaps and self.untangled
+
+    @cached_property
+    def overlaps(self) -> bool:
+        """Whether the pattern overlaps itself."""
+        sheet = self.pattern.surface(self.mesh)
+        return faults.overlaps(sheet, self.pattern.flat).size > 0
+
+    @cached_property
+    def untangled(self) -> bool:
+        """Whether it is :attr:`sound`, or would be if its pattern did not overlap itself."""
         sheet = self.pattern.surface(self.mesh)
         return not (
             self.crossed
             or faults.folded(self.mesh).size
             or metrics.flipped_faces(sheet, self.pattern.flat).size
-            or faults.overlaps(sheet, self.pattern.flat).size
             or faults.crossings(self.mesh).size
         )
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gso import faults, metrics
+from gso import faults
 from gso.errors import MeshError
 from gso.geometry.ears import divided
 from gso.geometry.polygon import points_at
@@ -90,20 +90,13 @@ def without_overlaps(surface: RuledSurface, design: Mesh) -> RuledSurface:
         As of :func:`divided_to_fit`. The same object where it is not sound otherwise, and where
         strips would be divided into many parts.
     """
-    pattern = surface.pattern
-    sheet = pattern.surface(surface.mesh)
-    if (
-        surface.sound
-        or surface.crossed
-        or metrics.flipped_faces(sheet, pattern.flat).size
-        or faults.folded(surface.mesh).size
-        or faults.crossings(surface.mesh).size
-    ):
+    if not (surface.overlaps and surface.untangled):
         return surface
 
     def fits(flat: Array, rings: Sequence[Ints]) -> bool:
-        triangles = divided(list(rings), np.pad(flat, ((0, 0), (0, 1))))[0]
-        return not faults.overlaps(Mesh(np.pad(flat, ((0, 0), (0, 1))), triangles), flat).size
+        level = np.pad(flat, ((0, 0), (0, 1)))
+        part = Mesh(level, divided(list(rings), level)[0])
+        return not faults.overlaps(part, flat).size
 
     try:
         return divided_to_fit(surface, design, fits, most=_PARTS)[0]

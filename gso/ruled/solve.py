@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -105,9 +105,10 @@ class Found:
     divided: bool = False
 
     @classmethod
-    def of(cls, surface: RuledSurface, start: str) -> Found:
+    def of(cls, surface: RuledSurface, start: str, *, divided: bool = False) -> Found:
         """Return a measured surface with its mean distance."""
-        return cls(surface, 0.0 if surface.deviation is None else surface.deviation.mean, start)
+        far = surface.deviation
+        return cls(surface, 0.0 if far is None else far.mean, start, divided)
 
     @property
     def ends(self) -> Array:
@@ -256,7 +257,7 @@ class _Search:
         whole = surface = built(job, evened(job, fit))
         if job.conditions.mirror is None:
             surface = without_overlaps(whole, design)
-        return replace(Found.of(surface.measured(design), start), divided=surface is not whole)
+        return Found.of(surface.measured(design), start, divided=surface is not whole)
 
 
 def _first(job: Job, normals: Array, wanted: Wanted) -> Fit:

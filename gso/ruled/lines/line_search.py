@@ -370,8 +370,8 @@ class LineStrips:
             # Corners that run together leave faces without area.
             return None
         surface = without_overlaps(whole, self.mesh)
-        found = Found.of(surface.measured(self.mesh, sampled=True), LINES)
-        return replace(found, divided=surface is not whole)
+        measured = surface.measured(self.mesh, sampled=True)
+        return Found.of(measured, LINES, divided=surface is not whole)
 
     def _fitter(self, mesh: Mesh) -> LineFitter:
         """Return what fits strips along the lines of a mesh."""
