@@ -498,6 +498,22 @@ def strips_within(make, bound):
     return gso.strips(sampled(make).round(6), max_deviation=bound)
 
 
+def vault(u, v):
+    """A barrel vault whose crown goes up and down."""
+    return 4 * u - 2, 3 * v, (1 - (2 * u - 1) ** 2) * (1.17 + 0.3 * np.sin(3 * np.pi * v))
+
+
+@pytest.mark.slow
+def test_a_few_more_strips_are_taken_where_fewer_are_folded_sharply():
+    lines = LineStrips(scaled(sampled(vault, 33, 41)))
+    found = lines.within(Wanted(None, 32, False, 0.01, None, None, 64)).surface
+    fewest = next(k for k, one in sorted(lines.results.items()) if one.surface.farthest <= 0.01)
+    assert lines.results[fewest].surface.sound
+    assert fewest < found.strips <= fewest + fewest // 3
+    folds = [one.rulings.largest_angle for one in (found, lines.results[fewest].surface)]
+    assert folds[0] < np.radians(20) < 0.5 * folds[1]
+
+
 @pytest.mark.parametrize("digits", [6, 9])
 def test_rounded_coordinates_of_a_straight_outline_change_nothing(digits):
     exact = sampled(awning, 31, 23)

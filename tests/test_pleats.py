@@ -8,7 +8,7 @@ import pytest
 import gso
 from gso import faults
 from gso.mesh import Mesh
-from gso.ruled import Folds, pleats
+from gso.ruled import Folds, pleats, sharpest_fold
 from gso.verdict import Code
 
 NONE = Folds(np.empty((0, 2), np.int64), np.empty(0), np.empty(0))
@@ -58,6 +58,17 @@ def test_a_design_that_goes_up_and_down_itself_is_followed():
     assert measured(points, sheet(points)[0]).max() <= 1e-9
     # Half of the angles are the design's.
     assert measured(points, sheet(profile(zigzag(5.0)))[0]) == pytest.approx([10.0], abs=1e-6)
+
+
+def test_the_sharpest_fold_is_that_beyond_the_design():
+    roof = profile(np.tan(np.radians(15.0)) * np.abs(0.1 * np.arange(17) - 0.8))
+    mesh, edges, angles = sheet(roof)
+    given = mesh, np.zeros(len(mesh.faces), np.int64), Folds(edges, angles, angles), NONE
+    assert np.degrees(sharpest_fold(*given, flat())) == pytest.approx(30.0, abs=1e-6)
+    # A ridge of the design is meant.
+    assert sharpest_fold(*given, mesh) == pytest.approx(0.0, abs=1e-9)
+    none = Folds(NONE.edges, NONE.angles, NONE.angles)
+    assert sharpest_fold(*given[:2], none, NONE, flat()) == 0.0
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])

@@ -14,8 +14,8 @@ pieces of designs.
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
 from gso.ruled.fold_lines import Folds
-from gso.ruled.pleat_angles import pleats
+from gso.ruled.pleat_angles import pleats, sharpest_fold
 from gso.ruled.strip_layout import Strips
 from gso.ruled.untrimmed import Untrimmed
 
-__all__ = ["Conditions", "Domain", "Folds", "Strips", "Untrimmed", "pleats"]
+__all__ = ["Conditions", "Domain", "Folds", "Strips", "Untrimmed", "pleats", "sharpest_fold"]

@@ -1,6 +1,8 @@
-"""Pleats: bends of a strip that go up and down in turn where the design does not."""
+"""Pleats, and other bends of strips where the design does not bend as much."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,36 +44,78 @@ def pleats(mesh: Mesh, strip: Ints, rulings: Folds, creases: Folds, design: Mesh
     out = np.zeros(int(strip.max()) + 1)
     if len(rulings.edges) < 2:
         return out
-    he, count = mesh.half_edges, len(mesh.vertices)
-    k = np.flatnonzero(he.origin < he.dest)
-    k = k[he.twin[k] >= 0]
-    ends = np.stack([he.origin[k], he.dest[k]], axis=1)
-    one, two = he.face[k], he.face[he.twin[k]]
-    keys, bends = pair_keys(ends, count), pair_keys(rulings.edges, count)
-    bent = np.isin(keys, bends)
-    level = ~(bent | np.isin(keys, pair_keys(creases.edges, count)))
-    level &= strip[one] == strip[two]
-    order = np.argsort(bends)
-    angle = rulings.angles[order[np.searchsorted(bends[order], keys[bent])]]
-    planar = label_components(len(mesh.faces), one[level], two[level])
-    normal, middle = _planes(mesh, planar)
-    triangle, _ = Nearest(design).nearest(middle)
-    a, b, c = design.vertices[design.triangles[triangle]].transpose(1, 0, 2)
-    own = unit(cross(b - a, c - a))
-    p, q = planar[one[bent]], planar[two[bent]]
-    way = unit(mesh.vertices[ends[bent, 1]] - mesh.vertices[ends[bent, 0]])
-    turn = fold_angles(normal[p], normal[q], way)
-    excess = turn - fold_angles(_across(own[p], way), _across(own[q], way), way)
-    size = np.where(turn * excess > 0.0, np.minimum(np.abs(turn), np.abs(excess)), 0.0)
+    bends = _Bends.of(mesh, strip, rulings, creases, design)
     # Faces that meet at a small angle are one.
-    small = np.abs(angle) < _SMALL
-    face = label_components(len(normal), p[small], q[small])
+    small = np.abs(bends.angle) < _SMALL
+    face = label_components(int(bends.planar.max()) + 1, bends.left[small], bends.right[small])
     up, down = np.zeros((2, int(face.max()) + 1))
-    for side in (p, q):
-        np.maximum.at(up, face[side], np.where(angle > 0.0, size, 0.0))
-        np.maximum.at(down, face[side], np.where(angle < 0.0, size, 0.0))
-    np.maximum.at(out, strip, np.minimum(up, down)[face[planar]])
+    for side in (bends.left, bends.right):
+        np.maximum.at(up, face[side], np.where(bends.angle > 0.0, bends.excess, 0.0))
+        np.maximum.at(down, face[side], np.where(bends.angle < 0.0, bends.excess, 0.0))
+    np.maximum.at(out, strip, np.minimum(up, down)[face[bends.planar]])
     return out
+
+
+def sharpest_fold(mesh: Mesh, strip: Ints, rulings: Folds, creases: Folds, design: Mesh) -> float:
+    """Measure the largest angle by which a bend of strips turns more than the design there.
+
+    The parameters, and the angle of the design, are those of :func:`pleats`.
+
+    Returns
+    -------
+    float
+        In radians; zero where there are no bends.
+    """
+    if not len(rulings.edges):
+        return 0.0
+    return float(_Bends.of(mesh, strip, rulings, creases, design).excess.max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class _Bends:
+    """The bends of strips, and how much more than the design they turn.
+
+    Attributes
+    ----------
+    planar : ndarray of int, (m,)
+        Group of coplanar faces that each face belongs to.
+    left, right : ndarray of int, (b,)
+        The groups on both sides of each bend.
+    angle, excess : ndarray, (b,)
+        Its angle, and the size of what the design does not turn there, in radians.
+    """
+
+    planar: Ints
+    left: Ints
+    right: Ints
+    angle: Array
+    excess: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh, strip: Ints, rulings: Folds, creases: Folds, design: Mesh) -> _Bends:
+        """Find the bends of strips and compare them with a design."""
+        he, count = mesh.half_edges, len(mesh.vertices)
+        k = np.flatnonzero(he.origin < he.dest)
+        k = k[he.twin[k] >= 0]
+        ends = np.stack([he.origin[k], he.dest[k]], axis=1)
+        one, two = he.face[k], he.face[he.twin[k]]
+        keys, bends = pair_keys(ends, count), pair_keys(rulings.edges, count)
+        bent = np.isin(keys, bends)
+        level = ~(bent | np.isin(keys, pair_keys(creases.edges, count)))
+        level &= strip[one] == strip[two]
+        order = np.argsort(bends)
+        angle = rulings.angles[order[np.searchsorted(bends[order], keys[bent])]]
+        planar = label_components(len(mesh.faces), one[level], two[level])
+        normal, middle = _planes(mesh, planar)
+        triangle, _ = Nearest(design).nearest(middle)
+        a, b, c = design.vertices[design.triangles[triangle]].transpose(1, 0, 2)
+        own = unit(cross(b - a, c - a))
+        p, q = planar[one[bent]], planar[two[bent]]
+        way = unit(mesh.vertices[ends[bent, 1]] - mesh.vertices[ends[bent, 0]])
+        turn = fold_angles(normal[p], normal[q], way)
+        excess = turn - fold_angles(_across(own[p], way), _across(own[q], way), way)
+        size = np.where(turn * excess > 0.0, np.minimum(np.abs(turn), np.abs(excess)), 0.0)
+        return cls(planar, p, q, angle, size)
 
 
 def _planes(mesh: Mesh, planar: Ints) -> tuple[Array, Array]:

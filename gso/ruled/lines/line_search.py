@@ -19,6 +19,7 @@ from gso.ruled.lines.line_surface import line_surface
 from gso.ruled.lines.line_twist import alignment
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.lines.strip_cells import Cells
+from gso.ruled.pleat_angles import sharpest_fold
 from gso.ruled.sheet_division import without_overlaps
 from gso.ruled.solve import Found, Wanted
 from gso.typing import Array, Ints
@@ -61,6 +62,9 @@ _MORE, _SOLVES = 1.3, 10
 #: Solves within the distance, in a row, whose strips are pleated and no less than before, after
 #: which the search ends.
 _PLEATED = 2
+#: Fold at a bend in radians, beyond that of the design, of which a few more strips may have less,
+#: and the share of it that these may have.
+_SHARP, _GENTLER = float(np.radians(20.0)), 0.5
 #: Solves without any sound strips after which the search ends.
 _FOLDED = 3
 
@@ -329,9 +333,31 @@ class LineStrips:
         every = sorted(k for k in self.results if k <= most)
         met = [k for k in every if self._meets(wanted, k)]
         if met:
-            return self._certain(min(met, key=lambda k: self.results[k].surface.strips))
+            fewest = min(met, key=lambda k: self.results[k].surface.strips)
+            return self._certain(self._gentler(fewest, wanted))
         best = min(every, key=lambda k: _distance(self.results[k]), default=None)
         return None if best is None else self._certain(best)
+
+    def _gentler(self, count: int, wanted: Wanted) -> int:
+        """Return a number of strips that are folded less sharply where the design is smooth.
+
+        It is at most a third larger, and the same where strips have no such folds, or others are
+        no better.
+        """
+        sharp = self._sharpest(count)
+        last = min(count + count // 3, wanted.most, self.most)
+        for more in range(count + 1, 1 + (last if sharp > _SHARP else 0)):
+            if self.stopped:
+                break
+            self._solve(more, wanted.max_deviation or np.inf)
+            if self._meets(wanted, more) and self._sharpest(more) <= _GENTLER * sharp:
+                return more
+        return count
+
+    def _sharpest(self, count: int) -> float:
+        """Return the angle by which solved strips are folded more sharply than the mesh."""
+        found = self.results[count].surface
+        return sharpest_fold(found.mesh, found.strip, found.rulings, found.creases, self.mesh)
 
     def _meets(self, wanted: Wanted, count: int) -> bool:
         """Return whether a number of strips was solved for and meets bounds."""
