@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
+import trimesh
 
 import gso
 from gso import OptionError
@@ -323,6 +324,30 @@ class TestParts:
         for seam in whole.matings:
             most = 2.0 * whole.record["strain_max"] * seam.length
             assert seam.mismatch(whole.panels) <= most
+
+    def test_seams_end_where_cuts_meet_the_outline_of_the_design(self):
+        ball = trimesh.creation.icosphere(subdivisions=1)
+        above = ball.faces[ball.vertices[ball.faces][:, :, 2].mean(axis=1) > -0.1]
+        whole = made(Design("dome", gso.as_mesh((ball.vertices, above))), FabricationSettings())
+        assert len(whole.panels) == 1 and len(whole.matings) > 5
+        assert max(seam.mismatch(whole.panels) for seam in whole.matings) < 1e-9
+
+    @pytest.mark.slow
+    def test_seams_between_pieces_end_where_one_of_them_is_cut_open(self):
+        # A wall, cut open anywhere, and a roof of strips that are cut open elsewhere.
+        t = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+        rings = [(3.0, 0.0), (3.0, 1.5), (1.8, 2.3), (0.5, 3.1)]
+        points = [np.stack([r * np.cos(t), r * np.sin(t), 0 * t + z], axis=1) for r, z in rings]
+        k = np.arange(3)[:, None] * 48 + np.arange(48)
+        after = np.roll(k, -1, axis=1)
+        faces = np.stack([k, after, after + 48, k + 48], axis=-1).reshape(-1, 4)
+        yurt = gso.as_mesh((np.concatenate(points), faces))
+        whole = made(Design("yurt", yurt), FabricationSettings())
+        between = [seam for seam in whole.matings if not seam.common]
+        for seam in between:
+            assert seam.mismatch(whole.panels) < 2e-3 * seam.length
+        around = 48 * 2 * 3.0 * np.sin(np.pi / 48)
+        assert sum(seam.length for seam in between) == pytest.approx(around, rel=5e-3)
 
     def test_notches_point_into_the_part(self):
         whole = domed(0.6, "3%")

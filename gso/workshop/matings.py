@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from gso.cut_pieces import Pieces
-from gso.geometry.polygon import arc_lengths
+from gso.geometry.polygon import arc_lengths, points_at
+from gso.geometry.vectors import lengths
 from gso.mesh.polyline import Polylines
 from gso.mesh.topology import half_edges
 from gso.pattern import Pattern
@@ -21,6 +23,9 @@ from gso.workshop.panels import Mating, Panel, Side
 _CORNER = np.radians(30.0)
 #: Difference of angles, in radians, up to which a seam has one angle.
 _SAME = np.radians(1.0)
+#: Way along an outline between neighbouring points of a seam, relative to their distance and those
+#: from the outline, from which on a cut lies between; and number of parts of a step there.
+_JUMP, _FINER = 3.0, 32
 
 
 def of_pattern(
@@ -58,23 +63,22 @@ def of_pattern(
         known[a, b], known[b, a] = (seams[k], ahead[k]), (seams[k][:, ::-1], not ahead[k])
         turn[a, b] = turn[b, a] = np.nan if angles is None else float(angles[k])
     out = []
-    for _, line in chains(edges, sides):
-        both: list[list[int]] = [[], []]
-        for a, b in pairwise(line.tolist()):
-            copies, first = known[a, b]
+    for _, chain in chains(edges, sides):
+        copies = []
+        for a, b in pairwise(chain.tolist()):
+            pair, first = known[a, b]
             # The first side is the one whose faces lie to the left of the chain.
-            for side, ends in zip(both, copies if first else copies[::-1], strict=True):
-                side += ends.tolist() if not side else [int(ends[1])]
-        table = np.array(both)
-        turned = np.zeros(len(line), bool)
-        if corners:
-            turned[1:-1] = (_turns(pattern.flat[table]) > _CORNER).any(axis=0)
-        for a, b in pairwise([0, *np.flatnonzero(turned).tolist(), len(line) - 1]):
-            one, two = (_side(side, label, local) for side in table[:, a : b + 1])
-            own = [turn[ends] for ends in pairwise(line[a : b + 1].tolist())]
-            angle = np.inf if np.ptp(own) > _SAME else float(np.mean(own))
-            along = arc_lengths(points[line[a : b + 1]])
-            out.append(Mating(0, along, one, two, angle=angle))
+            copies.append(pair if first else pair[::-1])
+        for line, table in _unbroken(chain, np.array(copies)):
+            turned = np.zeros(len(line), bool)
+            if corners:
+                turned[1:-1] = (_turns(pattern.flat[table]) > _CORNER).any(axis=0)
+            for a, b in pairwise([0, *np.flatnonzero(turned).tolist(), len(line) - 1]):
+                one, two = (_side(side, label, local) for side in table[:, a : b + 1])
+                own = [turn[ends] for ends in pairwise(line[a : b + 1].tolist())]
+                angle = np.inf if np.ptp(own) > _SAME else float(np.mean(own))
+                along = arc_lengths(points[line[a : b + 1]])
+                out.append(Mating(0, along, one, two, angle=angle))
     return out
 
 
@@ -100,17 +104,24 @@ def across(
     flat = Pattern(opened.mesh.vertices[:, :2], opened.mesh.faces, opened.vertex, opened.seams)
     out = []
     for seam in of_pattern(pieces.design.vertices, flat, label, np.arange(len(label))):
-        feet = []
-        for side in (seam.one, seam.two):
-            own = [k for k, piece in enumerate(owner) if piece == side.panel]
-            feet.append(_nearest(points[side.edges[:, 0]], own, panels, rims))
-        change = np.flatnonzero(np.diff(feet[0][0]) | np.diff(feet[1][0])) + 1
-        for a, b in pairwise([0, *change.tolist(), len(seam.along)]):
+        line, along = points[seam.one.edges[:, 0]], seam.along
+        both = [
+            [k for k, piece in enumerate(owner) if piece == side.panel]
+            for side in (seam.one, seam.two)
+        ]
+        feet = [_feet(line, own, panels, rims) for own in both]
+        ends = _ends(feet, line, panels)
+        if len(ends):
+            # A side goes on elsewhere between two points: nearly all of that belongs to one of it.
+            line, along = _refined(ends, line, along)
+            feet = [_feet(line, own, panels, rims) for own in both]
+            ends = _ends(feet, line, panels)
+        for a, b in pairwise([0, *ends.tolist(), len(along)]):
             if b - a > 1:
                 one, two = (
-                    Side(int(panel[a]), edges[a:b], share[a:b]) for panel, edges, share in feet
+                    Side(int(foot.panel[a]), foot.edges[a:b], foot.shares[a:b]) for foot in feet
                 )
-                out.append(Mating(0, seam.along[a:b] - seam.along[a], one, two, common=False))
+                out.append(Mating(0, along[a:b] - along[a], one, two, common=False))
     return out
 
 
@@ -128,6 +139,28 @@ def alike(matings: Sequence[Mating]) -> tuple[Mating, ...]:
     first: dict[bool, int] = {}
     kinds = [first.setdefault(m.one.panel == m.two.panel, m.number) for m in matings]
     return tuple(replace(one, kind=kind) for one, kind in zip(matings, kinds, strict=True))
+
+
+def _unbroken(chain: Ints, copies: Ints) -> list[tuple[Ints, Ints]]:
+    """Divide a chain where a side goes on at another copy of a vertex, as where cuts meet a rim.
+
+    Parameters
+    ----------
+    chain : ndarray of int, (k,)
+        Vertices along it.
+    copies : ndarray of int, (k - 1, 2, 2)
+        Copies of both ends of each edge, on both sides.
+
+    Returns
+    -------
+    list of (ndarray of int (n,), ndarray of int (2, n))
+        Vertices of each part, and their copies on both sides.
+    """
+    ends = np.flatnonzero((copies[1:, :, 0] != copies[:-1, :, 1]).any(axis=1)) + 1
+    return [
+        (chain[a : b + 1], np.concatenate([copies[a : a + 1, :, 0], copies[a:b, :, 1]]).T)
+        for a, b in pairwise([0, *ends.tolist(), len(copies)])
+    ]
 
 
 def _directed(pattern: Pattern, seams: Ints) -> list[bool]:
@@ -151,14 +184,65 @@ def _side(vertices: Ints, label: Ints, local: Ints) -> Side:
     return Side.of(int(label[vertices[0]]), local[vertices])
 
 
-def _nearest(
-    points: Array, own: Sequence[int], panels: Sequence[Panel], rims: list[Ints]
-) -> tuple[Ints, Ints, Array]:
-    """Find the nearest places on the outlines of some panels: panel, edge, share of each point."""
+class _Feet(NamedTuple):
+    """Nearest places on the outlines of panels: panel, edge and share of each point."""
+
+    panel: Ints
+    edges: Ints
+    shares: Array
+
+
+def _feet(points: Array, own: Sequence[int], panels: Sequence[Panel], rims: list[Ints]) -> _Feet:
+    """Find the nearest places on the outlines of some panels."""
     edges = np.concatenate([rims[k] for k in own])
     which = np.repeat(list(own), [len(rims[k]) for k in own])
     ends = np.concatenate([panels[k].surface.vertices[rims[k]] for k in own])
     unused = np.zeros((len(ends), 2), bool), np.zeros((len(ends), 2, 3))
     feet = Polylines(ends[:, 0], ends[:, 1], *unused).nearest(points)
     share = np.clip(feet.along, 0.0, 1.0)
-    return which[feet.segment], edges[feet.segment], share
+    return _Feet(which[feet.segment], edges[feet.segment], share)
+
+
+def _ends(feet: Sequence[_Feet], line: Array, panels: Sequence[Panel]) -> Ints:
+    """Return the points of a seam before which a side goes on elsewhere.
+
+    That is on another panel, or on the other side of a cut in the same one.
+    """
+    out = np.zeros(len(line) - 1, bool)
+    step = lengths(np.diff(line, axis=0))
+    for foot in feet:
+        place, off = np.empty((len(line), 3)), np.empty(len(line))
+        for k in np.unique(foot.panel).tolist():
+            on = foot.panel == k
+            side = Side(k, foot.edges[on], foot.shares[on])
+            place[on] = _places(panels[k], side)
+            off[on] = lengths(side.on(panels[k].surface.vertices) - line[on])
+        loop, at, around = place.T
+        way = np.abs(np.diff(at))
+        way = np.minimum(way, around[1:] - way)
+        out |= np.diff(foot.panel) != 0
+        out |= (np.diff(loop) != 0) | (way > _JUMP * (step + off[1:] + off[:-1]))
+    return np.flatnonzero(out) + 1
+
+
+def _places(panel: Panel, side: Side) -> Array:
+    """Return the boundary loop of points on a panel's outline, the place on it, and its length."""
+    flat = panel.flat
+    start, loop, around = np.zeros((3, len(flat)))
+    after = np.zeros(len(flat), np.int64)
+    for number, ids in enumerate(panel.loops):
+        along = arc_lengths(flat[np.r_[ids, ids[:1]]])
+        start[ids], loop[ids], around[ids] = along[:-1], number, along[-1]
+        after[ids] = np.roll(ids, -1)
+    a, b = side.edges.T
+    size, ahead = lengths(flat[b] - flat[a]), after[a] == b
+    at = np.where(ahead, start[a] + side.shares * size, start[b] + (1.0 - side.shares) * size)
+    return np.stack([loop[a], at, around[a]], axis=1)
+
+
+def _refined(ends: Ints, line: Array, along: Array) -> tuple[Array, Array]:
+    """Insert points into a seam before some of its points; its points and arc lengths."""
+    share = np.linspace(0.0, 1.0, _FINER + 1)[1:-1]
+    more = (along[ends - 1, None] + share * (along[ends] - along[ends - 1])[:, None]).ravel()
+    every = np.sort(np.concatenate([along, more]))
+    return points_at(every, along, line), every
