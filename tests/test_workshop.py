@@ -22,6 +22,7 @@ from gso.workshop import (
     Panel,
     Part,
     Thickness,
+    fit_notes,
     fitted,
     made,
     origins,
@@ -348,6 +349,15 @@ class TestParts:
             assert seam.mismatch(whole.panels) < 2e-3 * seam.length
         around = 48 * 2 * 3.0 * np.sin(np.pi / 48)
         assert sum(seam.length for seam in between) == pytest.approx(around, rel=5e-3)
+        assert not fit_notes(fitted(whole, 1000.0, Finish()))
+        wall = between[0].two.panel
+        panels = [
+            replace(panel, flat=1.02 * panel.flat) if k == wall else panel
+            for k, panel in enumerate(whole.panels)
+        ]
+        wide = fitted(replace(whole, panels=tuple(panels)), 1000.0, Finish())
+        (note,) = fit_notes(wide)
+        assert all(str(seam.number) in note for seam in between) and "(2." in note
 
     def test_notches_point_into_the_part(self):
         whole = domed(0.6, "3%")

@@ -25,6 +25,7 @@ from gso.workshop.page_drawings import sheet_drawing
 from gso.workshop.page_views import Views
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, GuideLine, Label, Notch, Part
+from gso.workshop.part_notes import fit_notes
 from gso.workshop.parts import fitted, parts_from
 from gso.workshop.pattern_drawing import drawn
 from gso.workshop.pattern_panels import of_net, of_pieces, of_surface
@@ -53,6 +54,7 @@ __all__ = [
     "design_record",
     "designs_of",
     "drawn",
+    "fit_notes",
     "fitted",
     "guide_lines",
     "hull_panels",

@@ -53,6 +53,7 @@ from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
 from gso.workshop.part_notes import (
     book_notes,
+    fit_notes,
     guide_notes,
     outline_notes,
     page_notes,
@@ -384,6 +385,7 @@ def fabricate(
         why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
         said = strip_notes(fit, record)
         said += [] if any(r.code is Code.PLEATED for r in why) else pleat_notes(fit.panels)
+        said += fit_notes(fit)
         said += outline_notes(fit.panels, record)
         said += without_tabs(bare) if asked.tabs else []
         if page is not None and paper is not None:

@@ -23,6 +23,8 @@ _PLEATED, _TURNS = 2.0, 4
 _BOOK = 50
 #: Distance of outlines from smooth curves that a note is made of, relative to the design's size.
 _COARSE = 5e-4
+#: Difference of the lengths of a seam's sides that a note is made of, relative to its length.
+_UNEQUAL = 0.01
 
 
 def strip_notes(fitted: Fitted, record: Json) -> list[str]:
@@ -133,6 +135,26 @@ def outline_notes(panels: Sequence[Panel], record: Json) -> list[str]:
     return [
         f"outlines are polygons, up to {far:.3g} mm from smooth curves through their corners; a "
         "finer design has finer outlines"
+    ]
+
+
+def fit_notes(fitted: Fitted) -> list[str]:
+    """Return a note on seams whose sides differ in length, as the parts only follow them.
+
+    Such parts are near the design, but one of them is too long for the other.
+    """
+    unequal, share, off = [], 0.0, 0.0
+    for seam in fitted.made.matings:
+        own = seam.mismatch(fitted.made.panels) / seam.length
+        if not seam.common and own > _UNEQUAL:
+            unequal.append(seam.number)
+            share, off = max(share, own), max(off, seam.mismatch(fitted.panels))
+    if not unequal:
+        return []
+    return [
+        f"{places('seam', unequal)}: the lengths of both sides differ by up to {off:.3g} mm "
+        f"({100.0 * share:.2g} %), as the parts are made one by one; a smaller max_deviation "
+        "makes them fit"
     ]
 
 
