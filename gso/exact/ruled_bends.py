@@ -60,13 +60,23 @@ def ruled_bends(
                 found.append(rows._replace(zone=np.full(len(rows.edges), number)))
                 continue
         turn, shift = _motion(sliced, face, flat)
+        own = max(near, 2.0 * _apex_error(face, flat, size))
         ends = [np.stack([bend.start, bend.end]) @ turn + shift for bend in bends]
-        lines = [_Line.of(line, face, shift, near) for line in ends]
-        ruled.append((number, bends, lines))
-    for number, _, lines in ruled:
-        _slice(sliced, number, lines, near)
-    found += [_on_lines(sliced, *one, near) for one in ruled]
+        lines = [_Line.of(line, face, shift, own) for line in ends]
+        ruled.append((number, bends, lines, own))
+    for number, _, lines, own in ruled:
+        _slice(sliced, number, lines, own)
+    found += [_on_lines(sliced, *one) for one in ruled]
     return joined_bends(found)
+
+
+def _apex_error(face: ShapeFace, flat: Array, size: float) -> float:
+    """Return the distance of a cone's apex from the vertex there; 0 if there is none."""
+    if face.surface is None or face.surface.slope == 0:
+        return 0.0
+    # Flat images of cones have the apex at the origin.
+    least = float(np.linalg.norm(flat[face.triangles], axis=-1).min())
+    return least if least < _COARSEST * size else 0.0
 
 
 def _slice(sliced: SlicedPattern, number: int, lines: list[_Line], near: float) -> None:

@@ -21,6 +21,7 @@ from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import Options
 from gso.ruled.paneling.piece_strips import found_pieces, of_found, of_pieces
+from gso.ruled.paneling.ring_strips import ring_strips
 from gso.ruled.paneling.sheet_strips import (
     against_parts,
     against_sheet,
@@ -165,7 +166,8 @@ class StripsTask:
             others = self._along_lines, self._as_a_whole
         else:
             others = self._as_a_whole, self._along_lines
-        return self._as_it_is, self._kept_smooth, self._between_creases, *others
+        first = self._as_it_is, self._kept_smooth, self._in_rings, self._between_creases
+        return *first, *others
 
     @property
     def _many(self) -> bool:
@@ -274,6 +276,21 @@ class StripsTask:
         except GSOError:
             return []
         return [replace(self._judged_pieces(*found), creased=True)]
+
+    def _in_rings(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
+        """Return a body of revolution in rings, if it is one whose number of strips is free."""
+        asked, allowed = self.request, light.allowed
+        if tried or not (self.divisible and asked.is_counted) or allowed is None:
+            return []
+        if asked.seams.preferences or asked.start.points is not None or not asked.options.lines:
+            return []
+        made = ring_strips(light.mesh, allowed, asked)
+        if made is None:
+            return []
+        undivided = light.whole(made, asked)
+        result = on_sheets(undivided, asked, [])
+        own = judge(result, asked.limits)
+        return [Tried(result, ordered([*own, *against_parts(result, asked)]), undivided)]
 
     @cached_property
     def _exact(self) -> StripsResult | None:

@@ -1,0 +1,258 @@
+"""Bodies of revolution in rings: parts of cones about the axis, each of which unrolls exactly.
+
+The profile becomes the polygon with the least largest distance, for a number of sides, among those
+with corners near points of it. Each side is the straight line in the middle of what it replaces,
+so that the rings are as far inside of the body as outside. The circles of its boundary stay, so
+that it fits what is joined there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gso.geometry.polygon import arc_lengths, points_at
+from gso.mesh import Mesh
+from gso.result import StripsResult
+from gso.ruled.lines.line_surface import line_surface
+from gso.ruled.lines.polygons import Polygons
+from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.ruled_surface import RuledSurface
+from gso.seams.revolution import Revolution
+from gso.status import Status
+from gso.typing import Array, Ints
+from gso.unknowns.tangents import tangents
+
+#: Name of this way in results.
+REVOLUTION = "revolution"
+#: Number of places of the profile that sides may end near.
+_PLACES = 160
+#: Number of rings that are measured, from the fewest on that the profile allows.
+_TRIED = 3
+#: Least and largest number of facets of a ring, and the part of the allowed distance that the
+#: facets are to be within of the circle.
+_FACETS, _ROUND = (48, 256), 0.02
+#: Largest move of a corner of the polygon along a side, relative to the side's length.
+_MOVED = 0.5
+#: Number of halvings of the range of a line's other end.
+_HALVED = 30
+_TINY = float(np.sqrt(np.finfo(float).tiny))
+
+
+def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsResult | None:
+    """Make rings of a body of revolution, as few as are within a distance, without a verdict.
+
+    Parameters
+    ----------
+    design : Mesh
+    allowed : float
+        Largest distance from the design, both ways, in its unit.
+    request : StripsRequest
+        Without constraints, start, and number of strips.
+
+    Returns
+    -------
+    StripsResult or None
+        None if the design is no body of revolution with a boundary or on its axis, or has rings
+        that do not hold the distance.
+    """
+    clock = time.perf_counter()
+    body = Revolution.of(design, allowed)
+    if body is None or body.is_closed:
+        return None
+    for polygon in _polygons(body.profile, allowed - body.apart, request.options.max_strips):
+        surface = _rings(design, body, polygon, allowed)
+        if surface.farthest <= allowed and surface.sound:
+            far = surface.deviation
+            return StripsResult(
+                task="developable",
+                formulation=RULED,
+                design=design,
+                status=Status.CONVERGED,
+                iterations=0,
+                energy={"distance": 0.0 if far is None else far.mean},
+                seconds={"strips": time.perf_counter() - clock},
+                notes=(*design.notes, _said(surface.strips)),
+                details={"strips": surface.strips, "rulings_from": REVOLUTION},
+                **StripsResult.attributes(surface),
+            )
+    return None
+
+
+def _said(count: int) -> str:
+    """Return a note on rings."""
+    rings = "one ring" if count == 1 else f"{count} rings"
+    return f"the design is a body of revolution: {rings}, each part of a cone about its axis"
+
+
+def _polygons(profile: Array, allowed: float, most: int) -> Iterator[Array]:
+    """Return polygons (k + 1, 2) near a profile, from the fewest sides within a distance on.
+
+    The largest distance is the least one for sides between places on the profile: the best
+    polygons of k sides up to each place come from those of k - 1.
+    """
+    line = _spread(profile)
+    sides = _Sides.of(line)
+    far = sides.far
+    best, before, found = far[0], [], 0
+    for count in range(1, most + 1):
+        if count > 1:
+            through = np.maximum(best[:, None], far)
+            before.append(through.argmin(axis=0))
+            best = through.min(axis=0)
+        if best[-1] > allowed:
+            continue
+        corners = [len(line) - 1]
+        for place in before[::-1]:
+            corners.insert(0, int(place[corners[0]]))
+        corners.insert(0, 0)
+        yield _polygon(line, np.array(corners), sides)
+        found += 1
+        if found == _TRIED:
+            return
+
+
+def _spread(profile: Array) -> Array:
+    """Return the points of a profile, and more between them in about equal steps."""
+    along = arc_lengths(profile)
+    even = np.linspace(0.0, along[-1], _PLACES)
+    apart = np.abs(even[:, None] - along).min(axis=1) > 0.5 * even[1]
+    return points_at(np.sort(np.concatenate([along, even[apart]])), along, profile)
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Straight lines in place of the parts of a profile between any two of its points (n).
+
+    Attributes
+    ----------
+    far : ndarray, (n, n)
+        Largest distance of the points from the line; infinite unless the second end comes later.
+    first, last : ndarray, (n, n)
+        Distance of the line from the first and from the second point, to the left.
+    """
+
+    far: Array
+    first: Array
+    last: Array
+
+    @classmethod
+    def of(cls, line: Array) -> _Sides:
+        """Find the lines, which begin and end on the profile's own ends off the axis."""
+        way = line[None] - line[:, None]
+        size = np.maximum(np.linalg.norm(way, axis=2), _TINY)[..., None]
+        left = np.stack([-way[..., 1], way[..., 0]], axis=2) / size
+        away = np.einsum("ijd,ikd->ijk", left, way)
+        k = np.arange(len(line))
+        away = np.where((k[:, None, None] <= k) & (k <= k[:, None]), away, 0.0)
+        low, high = away.min(axis=2), away.max(axis=2)
+        far, first = 0.5 * (high - low), 0.5 * (high + low)
+        last = first.copy()
+        begins, ends = line[0, 0] > 0.0, line[-1, 0] > 0.0
+        if begins:
+            far[0], last[0] = _tilted(away[0], _shares(line[0], line))
+            first[0] = 0.0
+        if ends:
+            far[:, -1], first[:, -1] = _tilted(away[:, -1], _shares(line[-1], line))
+            last[:, -1] = 0.0
+        if begins and ends:
+            far[0, -1], first[0, -1] = max(high[0, -1], -low[0, -1]), 0.0
+        return cls(np.where(np.tri(len(line), dtype=bool), np.inf, far), first, last)
+
+
+def _shares(end: Array, line: Array) -> Array:
+    """Return the places (n, n) of points (n, 2) along chords from one end to each of them."""
+    way = line - end
+    return np.asarray(way @ way.T / np.maximum((way**2).sum(axis=1), _TINY)[:, None])
+
+
+def _tilted(away: Array, share: Array) -> tuple[Array, Array]:
+    """Turn chords (n) about one end until points (n, k) are as far on one side as on the other.
+
+    Parameters
+    ----------
+    away, share : ndarray, (n, k)
+        Distances of points from the chords, to the left, and their places along them, from 0 at
+        the end that stays.
+
+    Returns
+    -------
+    far, moved : ndarray, (n,)
+        The largest distance left, and the move of the other end, to the left.
+    """
+    low, high = 2.0 * np.minimum(away.min(axis=1), 0.0), 2.0 * np.maximum(away.max(axis=1), 0.0)
+    for _ in range(_HALVED):
+        moved = 0.5 * (low + high)
+        left = away - moved[:, None] * share
+        more = left.max(axis=1) > -left.min(axis=1)
+        low, high = np.where(more, moved, low), np.where(more, high, moved)
+    left = away - (0.5 * (low + high))[:, None] * share
+    return np.abs(left).max(axis=1), 0.5 * (low + high)
+
+
+def _polygon(line: Array, corners: Ints, sides: _Sides) -> Array:
+    """Return the polygon whose corners are where lines near the profile meet.
+
+    Ends on the axis stay on it.
+    """
+    a, b = corners[:-1], corners[1:]
+    way = line[b] - line[a]
+    size = np.linalg.norm(way, axis=1, keepdims=True)
+    left = np.stack([-way[:, 1], way[:, 0]], axis=1) / size
+    start, end = (
+        line[at] + off[a, b][:, None] * left for at, off in ((a, sides.first), (b, sides.last))
+    )
+    out = np.concatenate([start[:1], 0.5 * (start[1:] + end[:-1]), end[-1:]])
+    way = end - start
+    turn = way[:-1, 0] * way[1:, 1] - way[:-1, 1] * way[1:, 0]
+    gap = start[1:] - start[:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (gap[:, 0] * way[1:, 1] - gap[:, 1] * way[1:, 0]) / turn
+    met = start[:-1] + share[:, None] * way[:-1]
+    near = np.linalg.norm(met - out[1:-1], axis=1) <= _MOVED * np.minimum(size[1:], size[:-1])[:, 0]
+    out[1:-1][near] = met[near]
+    for k, at in ((0, 0), (-1, -1)):
+        if line[at, 0] == 0.0:
+            # Along the side, back to the axis; the end of a side near the axis stays.
+            step = -out[at, 0] / way[k, 0] if way[k, 0] else np.inf
+            out[at] = out[at] + step * way[k] if abs(step) <= _MOVED else line[at]
+            out[at, 0] = 0.0
+    out[:, 0] = np.maximum(out[:, 0], 0.0)
+    return np.asarray(out)
+
+
+def _rings(design: Mesh, body: Revolution, polygon: Array, allowed: float) -> RuledSurface:
+    """Return the surface of revolution of a polygon, with facets around, near a design.
+
+    The facets are as far inside of the circles as outside.
+    """
+    radius = float(polygon[:, 0].max())
+    count = int(np.ceil(np.pi / np.sqrt(2.0 * _ROUND * allowed / radius)))
+    count = int(np.clip(count, *_FACETS))
+    turn = 2.0 * np.pi * np.arange(count) / count
+    one, two = tangents(body.axis[None])
+    round_it = np.cos(turn)[:, None] * one + np.sin(turn)[:, None] * two
+    out = 2.0 / (1.0 + np.cos(np.pi / count)) * polygon[:, :1, None]
+    points = (out * round_it + polygon[:, 1:, None] * body.axis + body.origin).reshape(-1, 3)
+    rows = len(polygon) - 1
+    ids = np.arange((rows + 1) * count).reshape(rows + 1, count)
+    on_axis = polygon[:, 0] == 0.0
+    ids[on_axis] = ids[on_axis, :1]
+    after = np.roll(ids, -1, axis=1)
+    # The normals are on the left of the profile.
+    corners = np.stack([ids[:-1], ids[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
+    different = corners != np.roll(corners, 1, axis=1)
+    none = np.empty((0, 3), np.int64)
+    polygons = Polygons(
+        rings=[ring[own] for ring, own in zip(corners, different, strict=True)],
+        strip=np.repeat(np.arange(rows), count),
+        rulings=np.stack([ids[:-1], ids[1:]], axis=-1).reshape(-1, 2),
+        creases=np.stack([ids, after], axis=-1)[1:-1].reshape(-1, 2),
+        lines=none,
+        across=none,
+    )
+    return line_surface(design, polygons, points).measured(design)

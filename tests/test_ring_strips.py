@@ -1,0 +1,96 @@
+"""Bodies of revolution as rings: parts of cones, as few as hold a distance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gso
+from gso import metrics
+from gso.mesh import Mesh
+
+
+def revolved(profile, around=64) -> Mesh:
+    """A body of revolution of quads, and triangles at the ends of its profile on the axis."""
+    t = 2 * np.pi * np.arange(around) / around
+    radius, height = np.asarray(profile, float).T
+    points, rows = [], []
+    for r, z in zip(radius, height, strict=True):
+        first = sum(map(len, points))
+        if r == 0.0:
+            points.append(np.array([[0.0, 0.0, z]]))
+            rows.append(np.full(around, first))
+        else:
+            points.append(np.stack([r * np.cos(t), r * np.sin(t), 0.0 * t + z], axis=1))
+            rows.append(first + np.arange(around))
+    faces = []
+    for low, high in zip(rows[:-1], rows[1:], strict=True):
+        for a, b, c, d in zip(low, np.roll(low, -1), np.roll(high, -1), high, strict=True):
+            ring = [k for k, other in ((a, d), (b, a), (c, b), (d, c)) if k != other]
+            faces.append([*ring, *[-1] * (4 - len(ring))])
+    return gso.as_mesh((np.concatenate(points), np.array(faces)))
+
+
+def ball(rows=48, around=96) -> Mesh:
+    up = np.linspace(-np.pi / 2, np.pi / 2, rows + 1)[1:-1]
+    inner = np.stack([np.cos(up), np.sin(up)], axis=1)
+    return revolved([(0.0, -1.0), *inner, (0.0, 1.0)], around)
+
+
+@pytest.mark.parametrize("bound", [0.05, 0.02])
+def test_a_ball_becomes_as_few_rings_as_its_profile_needs(bound):
+    result = gso.strips(ball(), max_deviation=bound)
+    assert result.usable, result.reasons
+    # Half of the sagitta of each side is outside, and half inside.
+    few = next(k for k in range(1, 99) if 0.5 * (1 - np.cos(np.pi / (2 * k))) <= 0.97 * bound)
+    assert result.ruled.strips == few
+    assert result.pattern.mesh.components.max() + 1 == few
+    # Neither of these is what the profile was divided by.
+    radius = np.linalg.norm(result.mesh.vertices, axis=1)
+    assert np.abs(radius - 1.0).max() <= bound
+    assert metrics.area(result.mesh) == pytest.approx(4 * np.pi, rel=2 * bound)
+    strains = metrics.strains(result.pattern.surface(result.mesh), result.pattern.flat)
+    assert strains["max"] < 1e-12 if "max" in strains else max(strains.values()) < 1e-12
+
+
+def test_rings_do_not_depend_on_place_and_size():
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ [[1, 0, 0], [0, c, -s], [0, s, c]]
+    design = ball(24, 48)
+    moved = Mesh(250.0 * design.vertices @ turn.T + [3.0, -700.0, 40.0], design.faces)
+    one, two = (gso.strips(mesh, max_deviation="1%") for mesh in (design, moved))
+    assert one.ruled.strips == two.ruled.strips
+    far = one.ruled.farthest / design.diagonal, two.ruled.farthest / moved.diagonal
+    assert far[0] == pytest.approx(far[1], rel=0.02)
+
+
+def test_circles_of_the_boundary_stay():
+    up = np.linspace(-0.9, 1.1, 33)
+    vase = revolved(np.stack([1.0 + 0.4 * np.cos(2.0 * up), 1.5 * up], axis=1), 96)
+    result = gso.strips(vase, max_deviation="1%")
+    assert result.usable and "revolution" in result.notes[-1]
+    for loop, z in zip(result.mesh.boundary_loops, (-1.35, 1.65), strict=True):
+        ring = result.mesh.vertices[loop]
+        level = min((-1.35, 1.65), key=lambda h: abs(h - ring[:, 2].mean()))
+        own = 1.0 + 0.4 * np.cos(2.0 * level / 1.5)
+        np.testing.assert_allclose(ring[:, 2], level, atol=1e-3)
+        np.testing.assert_allclose(np.hypot(*ring[:, :2].T), own, rtol=3e-3)
+
+
+def test_cones_of_a_closed_body_come_back():
+    design = revolved([(0.0, -2.0), (1.0, 0.0), (0.6, 1.5), (0.0, 1.8)], 96)
+    result = gso.strips(design, max_deviation="1%")
+    assert result.usable and result.ruled.strips == 3
+    assert result.ruled.farthest < 2e-3
+
+
+def test_rings_are_divided_for_a_sheet():
+    result = gso.strips(ball(), max_deviation="1%", sheet=(2.5, 1.2))
+    assert result.usable, result.reasons
+    few = gso.strips(ball(), max_deviation="1%").pattern.mesh.components.max()
+    assert result.pattern.mesh.components.max() > few
+
+
+def test_symmetric_seams_are_still_gores():
+    found = gso.pieces(ball(24, 48), max_deviation="2%", symmetric=True)
+    assert len(found.alike()) == 1 and "gores" in found.notes[0]
