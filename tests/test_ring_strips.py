@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -24,7 +26,7 @@ def revolved(profile, around=64) -> Mesh:
             points.append(np.stack([r * np.cos(t), r * np.sin(t), 0.0 * t + z], axis=1))
             rows.append(first + np.arange(around))
     faces = []
-    for low, high in zip(rows[:-1], rows[1:], strict=True):
+    for low, high in pairwise(rows):
         for a, b, c, d in zip(low, np.roll(low, -1), np.roll(high, -1), high, strict=True):
             ring = [k for k, other in ((a, d), (b, a), (c, b), (d, c)) if k != other]
             faces.append([*ring, *[-1] * (4 - len(ring))])
@@ -50,7 +52,7 @@ def test_a_ball_becomes_as_few_rings_as_its_profile_needs(bound):
     assert np.abs(radius - 1.0).max() <= bound
     assert metrics.area(result.mesh) == pytest.approx(4 * np.pi, rel=2 * bound)
     strains = metrics.strains(result.pattern.surface(result.mesh), result.pattern.flat)
-    assert strains["max"] < 1e-12 if "max" in strains else max(strains.values()) < 1e-12
+    assert max(strains.values()) < 1e-12
 
 
 def test_rings_do_not_depend_on_place_and_size():
@@ -69,7 +71,8 @@ def test_circles_of_the_boundary_stay():
     vase = revolved(np.stack([1.0 + 0.4 * np.cos(2.0 * up), 1.5 * up], axis=1), 96)
     result = gso.strips(vase, max_deviation="1%")
     assert result.usable and "revolution" in result.notes[-1]
-    for loop, z in zip(result.mesh.boundary_loops, (-1.35, 1.65), strict=True):
+    assert len(result.mesh.boundary_loops) == 2
+    for loop in result.mesh.boundary_loops:
         ring = result.mesh.vertices[loop]
         level = min((-1.35, 1.65), key=lambda h: abs(h - ring[:, 2].mean()))
         own = 1.0 + 0.4 * np.cos(2.0 * level / 1.5)
