@@ -80,7 +80,8 @@ def test_a_design_as_it_is_meets_its_constraints_or_changes():
 
 def test_seams_are_searched_for_once(tmp_path):
     said = []
-    design, allowed = ball(10), "5%"
+    # No body of revolution.
+    design, allowed = Mesh(ball(10).vertices * [1.0, 1.2, 1.4], ball(10).faces), "5%"
     job = gso.fabricate(design, tmp_path, max_deviation=allowed, callback=said.append, **QUICK)
     assert job.usable, job.reasons
     assert sum(text.endswith("seams and shape, attempt 1") for text in said) == 1
