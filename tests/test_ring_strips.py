@@ -94,6 +94,15 @@ def test_rings_are_divided_for_a_sheet():
     assert result.pattern.mesh.components.max() > few
 
 
+def test_more_rings_hold_a_bound_on_creases():
+    free = gso.strips(ball(24, 48), max_deviation="1%")
+    most = 0.9 * np.degrees(free.ruled.creases.largest_angle)
+    result = gso.strips(ball(24, 48), max_deviation="1%", max_crease=most)
+    assert result.usable and "revolution" in result.notes[-1]
+    assert result.ruled.strips > free.ruled.strips
+    assert result.ruled.creases.largest_angle <= np.radians(most)
+
+
 def test_symmetric_seams_are_still_gores():
     found = gso.pieces(ball(24, 48), max_deviation="2%", symmetric=True)
     assert len(found.alike()) == 1 and "gores" in found.notes[0]

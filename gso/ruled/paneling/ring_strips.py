@@ -21,6 +21,7 @@ from gso.ruled.lines.line_surface import line_surface
 from gso.ruled.lines.polygons import Polygons
 from gso.ruled.paneling.options import RULED
 from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.paneling.surface_strips import wanted
 from gso.ruled.ruled_surface import RuledSurface
 from gso.seams.revolution import Revolution
 from gso.status import Status
@@ -57,16 +58,17 @@ def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsR
     Returns
     -------
     StripsResult or None
-        None if the design is no body of revolution with a boundary or on its axis, or has rings
-        that do not hold the distance.
+        None if the design is no body of revolution, or a closed ring such as a torus, or if rings
+        do not hold the bounds.
     """
     clock = time.perf_counter()
     body = Revolution.of(design, allowed)
     if body is None or body.is_closed:
         return None
+    aim = wanted(request.options, allowed, 1.0)
     for polygon in _polygons(body.profile, allowed - body.apart, request.options.max_strips):
         surface = _rings(design, body, polygon, allowed)
-        if surface.farthest <= allowed and surface.sound:
+        if aim.met(surface):
             far = surface.deviation
             return StripsResult(
                 task="developable",

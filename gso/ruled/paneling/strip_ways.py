@@ -282,7 +282,9 @@ class StripsTask:
         asked, allowed = self.request, light.allowed
         if tried or not (self.divisible and asked.is_counted) or allowed is None:
             return []
-        if asked.seams.preferences or asked.start.points is not None or not asked.options.lines:
+        if asked.seams.preferences or asked.start.points is not None:
+            return []
+        if asked.options.flats or not asked.options.lines:
             return []
         made = ring_strips(light.mesh, allowed, asked)
         if made is None:
