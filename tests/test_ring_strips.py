@@ -87,6 +87,14 @@ def test_cones_of_a_closed_body_come_back():
     assert result.ruled.farthest < 2e-3
 
 
+def test_a_flanged_tube_stays_as_it_is(tmp_path):
+    # Both circles of the flange have as many vertices.
+    design = revolved([(1.6, 0.0), (1.6, 1.2), (1.0, 1.2), (1.0, 2.2)])
+    job = gso.fabricate(design, tmp_path, max_deviation="1%", unit="m", workers=0, formats=("svg",))
+    assert job.usable, job.reasons
+    assert len(job.parts) == 3 and job.certificate["designs"][0]["deviation_max"] == 0.0
+
+
 def test_rings_are_divided_for_a_sheet():
     result = gso.strips(ball(), max_deviation="1%", sheet=(2.5, 1.2))
     assert result.usable, result.reasons

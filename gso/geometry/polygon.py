@@ -37,15 +37,18 @@ def mean_width(loops: Sequence[Array]) -> float:
     Parameters
     ----------
     loops : sequence of ndarray, (k, 2)
-        Its boundary loops, the outer one first.
+        Its boundary loops; the one with the largest area is the outer one.
 
     Examples
     --------
     >>> round(mean_width([np.array([[0.0, 0], [98, 0], [98, 2], [0, 2]])]), 2)
     1.96
+    >>> square = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    >>> mean_width([2.0 * square, 3.0 * square]), mean_width([3.0 * square, 2.0 * square])
+    (1.0, 1.0)
     """
-    outer, *holes = (abs(signed_area(loop)) for loop in loops)
-    return 2.0 * (outer - sum(holes)) / sum(perimeter(loop) for loop in loops)
+    areas = [abs(signed_area(loop)) for loop in loops]
+    return 2.0 * (2.0 * max(areas) - sum(areas)) / sum(perimeter(loop) for loop in loops)
 
 
 def perimeter(polygon: Array) -> float:

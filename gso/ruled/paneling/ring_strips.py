@@ -155,15 +155,43 @@ class _Sides:
         far, first = 0.5 * (high - low), 0.5 * (high + low)
         last = first.copy()
         begins, ends = line[0, 0] > 0.0, line[-1, 0] > 0.0
+        across = np.abs(left[..., 1])
         if begins:
             far[0], last[0] = _tilted(away[0], _shares(line[0], line))
             first[0] = 0.0
+        else:
+            far[0], first[0] = _pointed(low[0], high[0], across[0])
+            last[0] = first[0]
         if ends:
             far[:, -1], first[:, -1] = _tilted(away[:, -1], _shares(line[-1], line))
             last[:, -1] = 0.0
+        else:
+            far[:, -1], first[:, -1] = _pointed(low[:, -1], high[:, -1], across[:, -1])
+            last[:, -1] = first[:, -1]
         if begins and ends:
             far[0, -1], first[0, -1] = max(high[0, -1], -low[0, -1]), 0.0
         return cls(np.where(np.tri(len(line), dtype=bool), np.inf, far), first, last)
+
+
+def _pointed(low: Array, high: Array, across: Array) -> tuple[Array, Array]:
+    """Move chords that end on the axis, where the tip moves farther than they do.
+
+    Parameters
+    ----------
+    low, high : ndarray, (n,)
+        Least and largest distance of points from the chords, to the left: 0 or less, 0 or more.
+    across : ndarray, (n,)
+        Cosine of the angle between the chord and the radius.
+
+    Returns
+    -------
+    far, moved : ndarray, (n,)
+        The largest distance left, also of the tip, and the move to the left.
+    """
+    middle = 0.5 * (low + high)
+    most = np.where(middle > 0.0, high, -low)
+    moved = np.minimum(np.abs(middle), most * across / (1.0 + across))
+    return most - moved, np.copysign(moved, middle)
 
 
 def _shares(end: Array, line: Array) -> Array:
