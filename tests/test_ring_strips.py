@@ -43,8 +43,8 @@ def ball(rows=48, around=96) -> Mesh:
 def test_a_ball_becomes_as_few_rings_as_its_profile_needs(bound):
     result = gso.strips(ball(), max_deviation=bound)
     assert result.usable, result.reasons
-    # Half of the sagitta of each side is outside, and half inside.
-    few = next(k for k in range(1, 99) if 0.5 * (1 - np.cos(np.pi / (2 * k))) <= 0.97 * bound)
+    # Corners are as far outside of a circle as the middles of sides are inside.
+    few = next(k for k in range(1, 99) if np.tan(np.pi / (4 * k)) ** 2 <= 0.97 * bound)
     assert result.ruled.strips == few
     assert result.pattern.mesh.components.max() + 1 == few
     # Neither of these is what the profile was divided by.
@@ -58,12 +58,28 @@ def test_a_ball_becomes_as_few_rings_as_its_profile_needs(bound):
 def test_rings_do_not_depend_on_place_and_size():
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ [[1, 0, 0], [0, c, -s], [0, s, c]]
+    # A ball has an axis in every direction.
     design = ball(24, 48)
+    design = Mesh(design.vertices * [1.0, 1.0, 1.4], design.faces)
     moved = Mesh(250.0 * design.vertices @ turn.T + [3.0, -700.0, 40.0], design.faces)
-    one, two = (gso.strips(mesh, max_deviation="1%") for mesh in (design, moved))
+    # A per cent of the bounding box would be another length.
+    one, two = (gso.strips(m, max_deviation=0.03 * k) for m, k in ((design, 1), (moved, 250)))
     assert one.ruled.strips == two.ruled.strips
-    far = one.ruled.farthest / design.diagonal, two.ruled.farthest / moved.diagonal
-    assert far[0] == pytest.approx(far[1], rel=0.02)
+    assert two.ruled.farthest == pytest.approx(250.0 * one.ruled.farthest, rel=0.01)
+
+
+def test_a_torus_becomes_closed_rings():
+    turn = np.linspace(0.0, 2 * np.pi, 41)
+    design = revolved(np.stack([3.0 - np.cos(turn), -np.sin(turn)], axis=1)[:-1], 72)
+    k = np.arange(72)
+    last = np.stack([39 * 72 + k, 39 * 72 + np.roll(k, -1), np.roll(k, -1), k], axis=1)
+    torus = Mesh(design.vertices, np.concatenate([design.faces, last]))
+    result = gso.strips(torus, max_deviation="1%")
+    assert result.usable and not result.mesh.boundary_loops
+    # Corners are as far outside of a circle as the middles of sides are inside.
+    few = next(k for k in range(3, 99) if np.tan(np.pi / (2 * k)) ** 2 <= 0.01 * torus.diagonal)
+    assert result.ruled.strips == few
+    assert metrics.area(result.mesh) == pytest.approx(4 * np.pi**2 * 3.0, rel=0.05)
 
 
 def test_circles_of_the_boundary_stay():

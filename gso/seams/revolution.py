@@ -28,7 +28,6 @@ from gso.mesh.separation import centres
 from gso.mesh.topology import edge_graph, label_components
 from gso.seams.straightening import stops
 from gso.typing import Array, Flags, Ints
-from gso.unknowns.tangents import tangents
 
 #: Largest root mean square of the normals' components along the circles about an axis, and the
 #: ratio and difference to the least one of all axes up to which an axis is tried.
@@ -38,6 +37,10 @@ _TURNED, _RATIO, _EXTRA = 0.3, 2.0, 0.02
 _GAP, _UNIQUE, _ROUNDING = 0.02, 4.0, 1e-9
 #: Largest distance of the surface from that of its profile over the allowed one.
 _SHARE = 0.5
+#: Least distance from the axis of the vertex that sections begin at, over the largest one.
+_FAR = 0.5
+#: Angle of the first section from that vertex: sections through vertices meet edges at their ends.
+_BESIDE = 0.3
 #: Number of sections, and steps of the profile's line over its length.
 _SECTIONS, _STEPS = 16, 100
 #: Share of the length of a section that its main part has at least.
@@ -174,14 +177,28 @@ def _axes(mesh: Mesh) -> list[tuple[Array, Array]]:
     return [one for one, own in zip(found, turned, strict=True) if own <= most]
 
 
+def directions(mesh: Mesh, origin: Array, axis: Array) -> tuple[Array, Array]:
+    """Return two unit vectors perpendicular to an axis and to each other.
+
+    The first is beside a vertex of the mesh, so that they turn with it.
+    """
+    away = mesh.vertices[mesh.used] - origin
+    away = away - (away @ axis)[:, None] * axis
+    far = lengths(away)
+    one = unit(away[int((far > _FAR * far.max()).argmax())])
+    two = np.cross(axis, one)
+    c, s = np.cos(_BESIDE), np.sin(_BESIDE)
+    return c * one + s * two, c * two - s * one
+
+
 class _Sections:
     """Sections of a triangle mesh by half-planes that begin at an axis."""
 
     def __init__(self, mesh: Mesh, origin: Array, axis: Array):
         self.mesh, self.origin, self.axis = mesh, origin, axis
-        one, two = tangents(axis[None])
+        one, two = directions(mesh, origin, axis)
         local = mesh.vertices - origin
-        self._x, self._y, self._z = local @ one[0], local @ two[0], local @ axis
+        self._x, self._y, self._z = local @ one, local @ two, local @ axis
         he = mesh.half_edges
         self._sides = mesh.edge_numbers(he.origin, he.dest).reshape(-1, 3)
 

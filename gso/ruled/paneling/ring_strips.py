@@ -23,10 +23,9 @@ from gso.ruled.paneling.options import RULED
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import wanted
 from gso.ruled.ruled_surface import RuledSurface
-from gso.seams.revolution import Revolution
+from gso.seams.revolution import Revolution, directions
 from gso.status import Status
 from gso.typing import Array, Ints
-from gso.unknowns.tangents import tangents
 
 #: Name of this way in results.
 REVOLUTION = "revolution"
@@ -39,6 +38,8 @@ _TRIED = 3
 _FACETS, _ROUND = (48, 256), 0.02
 #: Largest move of a corner of the polygon along a side, relative to the side's length.
 _MOVED = 0.5
+#: Least cosine of half the turn at a corner that is reckoned with.
+_BLUNT = 0.3
 #: Number of halvings of the range of a line's other end.
 _HALVED = 30
 _TINY = float(np.sqrt(np.finfo(float).tiny))
@@ -58,12 +59,11 @@ def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsR
     Returns
     -------
     StripsResult or None
-        None if the design is no body of revolution, or a closed ring such as a torus, or if rings
-        do not hold the bounds.
+        None if the design is no body of revolution, or rings do not hold the bounds.
     """
     clock = time.perf_counter()
     body = Revolution.of(design, allowed)
-    if body is None or body.is_closed:
+    if body is None:
         return None
     aim = wanted(request.options, allowed, 1.0)
     for polygon in _polygons(body.profile, allowed - body.apart, request.options.max_strips):
@@ -106,7 +106,7 @@ def _polygons(profile: Array, allowed: float, most: int) -> Iterator[Array]:
             through = np.maximum(best[:, None], far)
             before.append(through.argmin(axis=0))
             best = through.min(axis=0)
-        if best[-1] > allowed:
+        if best[-1] > allowed or (count < 3 and _is_closed(line)):
             continue
         corners = [len(line) - 1]
         for place in before[::-1]:
@@ -152,8 +152,15 @@ class _Sides:
         k = np.arange(len(line))
         away = np.where((k[:, None, None] <= k) & (k <= k[:, None]), away, 0.0)
         low, high = away.min(axis=2), away.max(axis=2)
-        far, first = 0.5 * (high - low), 0.5 * (high + low)
+        # Corners between lines are farther out than these, as on an arc of this height.
+        half = 2.0 * (high - low) / size[..., 0]
+        out = np.maximum((1.0 - half**2) / (1.0 + half**2), _BLUNT)
+        first = (high + low) * out / (1.0 + out)
+        far = np.maximum(np.maximum(high - first, first - low), np.abs(first) / out)
         last = first.copy()
+        if _is_closed(line):
+            far[0, -1] = np.inf
+            return cls(np.where(np.tri(len(line), dtype=bool), np.inf, far), first, last)
         begins, ends = line[0, 0] > 0.0, line[-1, 0] > 0.0
         across = np.abs(left[..., 1])
         if begins:
@@ -171,6 +178,11 @@ class _Sides:
         if begins and ends:
             far[0, -1], first[0, -1] = max(high[0, -1], -low[0, -1]), 0.0
         return cls(np.where(np.tri(len(line), dtype=bool), np.inf, far), first, last)
+
+
+def _is_closed(line: Array) -> bool:
+    """Whether a line ends where it begins, as the profile of a torus."""
+    return np.array_equal(line[0], line[-1])
 
 
 def _pointed(low: Array, high: Array, across: Array) -> tuple[Array, Array]:
@@ -236,6 +248,9 @@ def _polygon(line: Array, corners: Ints, sides: _Sides) -> Array:
     start, end = (
         line[at] + off[a, b][:, None] * left for at, off in ((a, sides.first), (b, sides.last))
     )
+    closed = _is_closed(line)
+    if closed:
+        start, end, size = (np.concatenate([x, x[:1]]) for x in (start, end, size))
     out = np.concatenate([start[:1], 0.5 * (start[1:] + end[:-1]), end[-1:]])
     way = end - start
     turn = way[:-1, 0] * way[1:, 1] - way[:-1, 1] * way[1:, 0]
@@ -245,6 +260,8 @@ def _polygon(line: Array, corners: Ints, sides: _Sides) -> Array:
     met = start[:-1] + share[:, None] * way[:-1]
     near = np.linalg.norm(met - out[1:-1], axis=1) <= _MOVED * np.minimum(size[1:], size[:-1])[:, 0]
     out[1:-1][near] = met[near]
+    if closed:
+        out = np.concatenate([out[-2:-1], out[1:-1]])
     for k, at in ((0, 0), (-1, -1)):
         if line[at, 0] == 0.0:
             # Along the side, back to the axis; the end of a side near the axis stays.
@@ -264,7 +281,7 @@ def _rings(design: Mesh, body: Revolution, polygon: Array, allowed: float) -> Ru
     count = int(np.ceil(np.pi / np.sqrt(2.0 * _ROUND * allowed / radius)))
     count = int(np.clip(count, *_FACETS))
     turn = 2.0 * np.pi * np.arange(count) / count
-    one, two = tangents(body.axis[None])
+    one, two = directions(design, body.origin, body.axis)
     round_it = np.cos(turn)[:, None] * one + np.sin(turn)[:, None] * two
     out = 2.0 / (1.0 + np.cos(np.pi / count)) * polygon[:, :1, None]
     points = (out * round_it + polygon[:, 1:, None] * body.axis + body.origin).reshape(-1, 3)
@@ -272,6 +289,9 @@ def _rings(design: Mesh, body: Revolution, polygon: Array, allowed: float) -> Ru
     ids = np.arange((rows + 1) * count).reshape(rows + 1, count)
     on_axis = polygon[:, 0] == 0.0
     ids[on_axis] = ids[on_axis, :1]
+    closed = _is_closed(polygon)
+    if closed:
+        ids[-1] = ids[0]
     after = np.roll(ids, -1, axis=1)
     # The normals are on the left of the profile.
     corners = np.stack([ids[:-1], ids[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
@@ -281,7 +301,7 @@ def _rings(design: Mesh, body: Revolution, polygon: Array, allowed: float) -> Ru
         rings=[ring[own] for ring, own in zip(corners, different, strict=True)],
         strip=np.repeat(np.arange(rows), count),
         rulings=np.stack([ids[:-1], ids[1:]], axis=-1).reshape(-1, 2),
-        creases=np.stack([ids, after], axis=-1)[1:-1].reshape(-1, 2),
+        creases=np.stack([ids, after], axis=-1)[0 if closed else 1 : -1].reshape(-1, 2),
         lines=none,
         across=none,
     )
