@@ -17,7 +17,7 @@ from gso.typing import AnyPath, Json
 #: Hours of each net, on two processor cores. The order is that of training.
 HOURS = {
     "developable": 3.0,
-    "flatten-strain": 0.75,
+    "flatten-strain": 1.25,
     "net-c": 1.5,
     "net-f": 0.75,
     "flatten": 0.75,
