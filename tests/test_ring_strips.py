@@ -111,6 +111,15 @@ def test_a_flanged_tube_stays_as_it_is(tmp_path):
     assert len(job.parts) == 3 and job.certificate["designs"][0]["deviation_max"] == 0.0
 
 
+def test_a_needle_has_no_rings_without_radius():
+    up = np.linspace(0.0, np.pi, 21)
+    needle = revolved(np.stack([0.02 * np.sin(up).round(12), up], axis=1), 24)
+    # A line would be near enough.
+    result = gso.strips(needle, max_deviation=0.1)
+    assert result.usable and result.ruled.strips == 2
+    assert metrics.area(result.mesh) > 0.5 * metrics.area(needle)
+
+
 def test_rings_are_divided_for_a_sheet():
     result = gso.strips(ball(), max_deviation="1%", sheet=(2.5, 1.2))
     assert result.usable, result.reasons

@@ -38,6 +38,8 @@ _TRIED = 3
 _FACETS, _ROUND = (48, 256), 0.02
 #: Largest move of a corner of the polygon along a side, relative to the side's length.
 _MOVED = 0.5
+#: Radius of a ring's end within the body, relative to the allowed distance, up to which it closes.
+_THIN = 1e-3
 #: Least cosine of half the turn at a corner that is reckoned with.
 _BLUNT = 0.3
 #: Number of halvings of the range of a line's other end.
@@ -67,6 +69,10 @@ def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsR
         return None
     aim = wanted(request.options, allowed, 1.0)
     for polygon in _polygons(body.profile, allowed - body.apart, request.options.max_strips):
+        inner, most = polygon[1:-1, 0], float(polygon[:, 0].max())
+        if inner.min(initial=most) <= _THIN * allowed:
+            # A needle, or a neck that closes.
+            continue
         surface = _rings(design, body, polygon, allowed)
         if aim.met(surface):
             far = surface.deviation
