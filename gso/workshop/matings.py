@@ -197,6 +197,11 @@ def _feet(points: Array, own: Sequence[int], panels: Sequence[Panel], rims: list
     edges = np.concatenate([rims[k] for k in own])
     which = np.repeat(list(own), [len(rims[k]) for k in own])
     ends = np.concatenate([panels[k].surface.vertices[rims[k]] for k in own])
+    # In one direction on both sides of a seam, so that places on a common edge are equal.
+    off = ends[:, 1] - ends[:, 0]
+    first = np.take_along_axis(off, (off != 0).argmax(axis=1)[:, None], axis=1)[:, 0]
+    back = first < 0
+    edges[back], ends[back] = edges[back, ::-1], ends[back, ::-1]
     unused = np.zeros((len(ends), 2), bool), np.zeros((len(ends), 2, 3))
     feet = Polylines(ends[:, 0], ends[:, 1], *unused).nearest(points)
     share = np.clip(feet.along, 0.0, 1.0)

@@ -122,7 +122,9 @@ class Side:
     def on(self, points: Array) -> Array:
         """Return the places (k, d) for positions (n, d) of the panel's vertices."""
         a, b = points[self.edges].transpose(1, 0, 2)
-        return np.asarray(a + self.shares[:, None] * (b - a))
+        # Exact at both ends.
+        share = self.shares[:, None]
+        return np.asarray((1.0 - share) * a + share * b)
 
 
 @dataclass(frozen=True, eq=False)
