@@ -14,7 +14,7 @@ from gso.mesh.topology import label_components
 from gso.metrics import Distances
 from gso.result import StripsResult
 from gso.ruled.fold_lines import Folds
-from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.made_strips import made_strips
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
 from gso.status import Status
@@ -72,15 +72,5 @@ def exact_strips(
         deviation=Distances(0.0, 0.0, 0.0, 0.0),
         strain=found.strain,
     )
-    return StripsResult(
-        task="developable",
-        formulation=RULED,
-        design=design,
-        status=Status.ALREADY_GOOD,
-        iterations=0,
-        energy={"distance": 0.0},
-        seconds={"strips": time.perf_counter() - clock},
-        notes=(*design.notes, as_it_is(found.strain)),
-        details={"strips": surface.strips, "rulings_from": "design"},
-        **StripsResult.attributes(surface),
-    )
+    status, notes = Status.ALREADY_GOOD, [as_it_is(found.strain)]
+    return made_strips(design, surface, status, "design", begun=clock, notes=notes)

@@ -19,7 +19,7 @@ from gso.mesh import Mesh
 from gso.result import StripsResult
 from gso.ruled.lines.line_surface import line_surface
 from gso.ruled.lines.polygons import Polygons
-from gso.ruled.paneling.options import RULED
+from gso.ruled.paneling.made_strips import made_strips
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import wanted
 from gso.ruled.ruled_surface import RuledSurface
@@ -76,17 +76,10 @@ def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsR
         surface = _rings(design, body, polygon, allowed)
         if aim.met(surface):
             far = surface.deviation
-            return StripsResult(
-                task="developable",
-                formulation=RULED,
-                design=design,
-                status=Status.CONVERGED,
-                iterations=0,
-                energy={"distance": 0.0 if far is None else far.mean},
-                seconds={"strips": time.perf_counter() - clock},
-                notes=(*design.notes, _said(surface.strips)),
-                details={"strips": surface.strips, "rulings_from": REVOLUTION},
-                **StripsResult.attributes(surface),
+            mean = 0.0 if far is None else far.mean
+            status, notes = Status.CONVERGED, [_said(surface.strips)]
+            return made_strips(
+                design, surface, status, REVOLUTION, begun=clock, mean=mean, notes=notes
             )
     return None
 

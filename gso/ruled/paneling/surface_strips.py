@@ -19,6 +19,7 @@ from gso.result import Result, StripsResult
 from gso.ruled.conditions import Conditions
 from gso.ruled.domain import Domain
 from gso.ruled.lines import EXACT, LineStrips, grid_copies
+from gso.ruled.paneling.made_strips import made_strips
 from gso.ruled.paneling.options import RULED, Options
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.ruled_surface import RuledSurface
@@ -264,20 +265,15 @@ def along_lines(
     met = not aim.bounded or aim.met(found.surface)
     status = Status.CONVERGED if met else Status.TARGET_MISSED
     tried = {k: one.surface.farthest for k, one in lines.results.items()}
-    return StripsResult(
-        task="developable",
-        formulation=RULED,
-        design=design,
-        status=Status.CANCELLED if lines.stopped else status,
-        iterations=0,
-        energy={"distance": found.mean},
-        history=[],
-        seconds={"strips": time.perf_counter() - clock},
-        backend="",
-        warm_start="cold",
-        notes=design.notes + _off(lines, request) + (_DIVIDED if found.divided else ()),
-        details={"strips": surface.strips, "rulings_from": found.start, "tried": _said(tried)},
-        **StripsResult.attributes(surface),
+    return made_strips(
+        design,
+        surface,
+        Status.CANCELLED if lines.stopped else status,
+        found.start,
+        begun=clock,
+        mean=found.mean,
+        notes=_off(lines, request) + (_DIVIDED if found.divided else ()),
+        tried=_said(tried),
     )
 
 
