@@ -14,6 +14,7 @@ import numpy as np
 from gso.io.json_file import plain
 from gso.mesh import Mesh
 from gso.typing import Array, Json
+from gso.workshop.nesting import Nested
 from gso.workshop.panels import Panel
 from gso.workshop.part import Drawing, Part
 from gso.workshop.parts import Fitted
@@ -165,6 +166,22 @@ def add_sheets(records: Sequence[Json], sheets: Sequence[Drawing]) -> None:
             free = numbers.get(entry["same_as"] or entry["name"], [])
             entry["sheets"] = free[: entry["count"]]
             del free[: entry["count"]]
+
+
+def nesting_record(nested: Nested, spacing: float, sheet: tuple[float, float]) -> Json:
+    """Describe sheets with parts in their places; lengths are in millimetres."""
+    return {
+        "sheets": [{"utilisation": share} for share in nested.utilisation],
+        "nesting": plain(
+            {
+                "method": nested.method,
+                "density": nested.density,
+                "spacing": spacing,
+                "sheet": list(sheet),
+                "notes": list(nested.notes),
+            }
+        ),
+    }
 
 
 def chord(outline: Array) -> float:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike
 
 from gso.constraints import Constraint, listed, record_of
 from gso.errors import OptionError
-from gso.exact import EXACT, as_it_is
 from gso.in_browser import in_notebook, open_file, picture
-from gso.io import Solid, check_unit
+from gso.io import check_unit
 from gso.io.json_file import plain, write_json
 from gso.mesh import Mesh
 from gso.quantities import (
@@ -32,16 +31,16 @@ from gso.quantities import (
 from gso.seams.edge_prices import Avoid, Follow
 from gso.short_repr import short_repr
 from gso.typing import AnyPath, Array, Json
-from gso.verdict import Code, Measurement, Reason, compare, failure, merge, ordered
+from gso.verdict import Code, Reason, failure
 from gso.wording import logged, places
 from gso.workshop.assembly_view import front
-from gso.workshop.certificate import add_sheets, design_record, digest, versions
-from gso.workshop.checks import judge_sheet
+from gso.workshop.certificate import add_sheets, nesting_record, versions
 from gso.workshop.congruent import origins, united
 from gso.workshop.constrained import check_formulation
 from gso.workshop.designs import Design, Designs, designs_of, several
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.finish import Finish
+from gso.workshop.finished_design import FinishedDesign, recorded
 from gso.workshop.job_folder import CERTIFICATE, PAGE, SOLIDS, WORK, opened, path_of
 from gso.workshop.marks import check_lines
 from gso.workshop.names import different
@@ -51,20 +50,7 @@ from gso.workshop.page_data import Shown
 from gso.workshop.page_views import Views
 from gso.workshop.panels import Made
 from gso.workshop.part import Drawing, Part
-from gso.workshop.part_notes import (
-    book_notes,
-    fit_notes,
-    guide_notes,
-    outline_notes,
-    page_notes,
-    pleat_notes,
-    seam_notes,
-    strip_notes,
-)
-from gso.workshop.parts import fitted, parts_from
-from gso.workshop.seam_strips import no_such_seam
-from gso.workshop.solids import folded_solids
-from gso.workshop.tabs import without_tabs
+from gso.workshop.part_notes import book_notes, guide_notes
 from gso.workshop.work import made_all
 from gso.workshop.writers.pdf import room
 
@@ -353,72 +339,31 @@ def fabricate(
     found, failed = made_all(every, chosen, settings, place / WORK, workers, scheduler, say)
     found = _named(found)
     say("parts")
-    # Parts are the same only if their sheets are.
-    of_sheet: dict[float | None, list[Part]] = {}
-    solids: list[Solid] = []
-    records: list[Json] = []
-    shown: list[Shown] = []
-    reasons: list[Reason] = []
+    finished: list[FinishedDesign] = []
+    for k in chosen:
+        copies = [every[j] for j, origin in enumerate(first) if origin == k]
+        if k not in found:
+            finished.append(FinishedDesign.failed(copies, failed[k]))
+            continue
+        marked, bored = ([x for x, n in zip(*both, strict=True) if n == k] for both in drawn)
+        finished.append(
+            FinishedDesign.of(
+                copies, found[k], settings, finish, marked, bored, step=step, paper=paper
+            )
+        )
     notes = [note for design in every for note in design.notes]
     notes += [note for design in every for note in _size_notes(design, settings)]
-    for k in chosen:
-        same_as = [every[j] for j, origin in enumerate(first) if origin == k]
-        copies = [design.name for design in same_as]
-        if k not in found:
-            why: tuple[Reason, ...] = (failure(Code.FAILED, failed[k]),)
-            records.append({"name": every[k].name, "copies": copies, "reasons": _words(why)})
-            reasons += [reason.within(every[k].name) for reason in why]
-            continue
-        one = found[k]
-        lines = ([x for x, n in zip(given, on, strict=True) if n == k] for given, on in drawn)
-        thick = every[k].sheet
-        asked = finish if thick is None else finish.of_solid(per_unit * thick)
-        fit = fitted(one, per_unit, asked, *lines)
-        alike = tuple(design.mesh for design in same_as)
-        shown.append(Shown(one, every[k].mesh, per_unit, fit.panels, alike))
-        if step and asked.thickness is not None:
-            solids += folded_solids(one.panels, per_unit, asked.thickness)
-        cut_out, bare = parts_from(fit, asked)
-        own = [replace(part, count=len(copies)) for part in cut_out]
-        record = design_record(fit, own, copies) | {"digest": digest(meshes[k])}
-        why = (*(r.scaled(per_unit) for r in one.reasons), *judge_sheet(fit, settings, asked))
-        why = merge(why, next((d.reasons for d in same_as if d.reasons), ()))
-        said = strip_notes(fit, record)
-        said += [] if any(r.code is Code.PLEATED for r in why) else pleat_notes(fit.panels)
-        said += fit_notes(fit)
-        said += outline_notes(fit.panels, record)
-        said += without_tabs(bare) if asked.tabs else []
-        if page is not None and paper is not None:
-            said += page_notes(own, paper)
-        said += seam_notes(one, settings.seams(every[k].along, every[k].avoid))
-        is_kept = one.record["deviation_max"] == 0.0
-        if is_kept and settings.formulation == "ruled" and one.record["strain_max"] > EXACT:
-            said.append(as_it_is(one.record["strain_max"]))
-        if is_kept and asked.tabs is not None:
-            why, through = _of_paper(why)
-            said += through
-        if asked.seam_strip:
-            why = merge(why, compare({Code.SEAM_STRIP: Measurement.count("seam", bare)}, {}))
-            said += no_such_seam(one.matings, asked.seam_overlap, asked.seam_flange)
-        notes += [f"{one.name}: {note}" for note in said]
-        record["reasons"] = _words(why)
-        records.append(record)
-        reasons += [reason.within(one.name) for reason in why]
-        of_sheet.setdefault(thick, []).extend(own)
+    notes += [note for one in finished for note in one.notes]
+    records = [one.record for one in finished]
+    reasons = [reason for one in finished for reason in one.reasons]
+    shown = [one.shown for one in finished if one.shown is not None]
+    solids = [solid for one in finished for solid in one.solids]
     if faceted := [solid.name for solid in solids if solid.faceted]:
         notes.append(
             f"{SOLIDS}: {places('part', faceted)} {'has' if len(faceted) == 1 else 'have'} flat "
             "facets in place of round faces that do not end at rulings and circles"
         )
-    parts: list[Part] = []
-    same: dict[str, str] = {}
-    for some in of_sheet.values():
-        different_parts, also = united(some)
-        parts += different_parts
-        same |= also
-    for record in records:
-        for entry in record.get("parts", ()):
-            entry["same_as"] = same.get(entry["name"])
+    parts = _different([(every[k].sheet, one) for k, one in zip(chosen, finished, strict=True)])
     certificate = {
         "unit": "mm",
         "asked": plain(
@@ -451,18 +396,9 @@ def fabricate(
             reasons.append(failure(Code.NOT_NESTED, str(error)))
         else:
             sheets = list(nested.sheets)
-            certificate["sheets"] = [{"utilisation": u} for u in nested.utilisation]
-            certificate["nesting"] = plain(
-                {
-                    "method": nested.method,
-                    "density": nested.density,
-                    "spacing": spacing,
-                    "sheet": list(size),
-                    "notes": list(nested.notes),
-                }
-            )
+            certificate |= nesting_record(nested, spacing, size)
     add_sheets(records, sheets)
-    certificate["reasons"], certificate["usable"] = _words(reasons), not reasons
+    certificate["reasons"], certificate["usable"] = recorded(reasons), not reasons
     certificate["parts"] = sum(part.count for part in parts)
     say("files")
     views = Views(shown, certificate)
@@ -481,22 +417,6 @@ def _size_notes(design: Design, settings: FabricationSettings) -> list[str]:
     return [f"{design.name}: {note}" for note in said]
 
 
-def _of_paper(why: tuple[Reason, ...]) -> tuple[tuple[Reason, ...], list[str]]:
-    """Say as notes what does not keep paper models from being built as the design is.
-
-    Parts of models that pass through themselves can be cut and folded, and paper is slit with a
-    knife where one wall goes through another, or what would be hidden is trimmed off. Plates of
-    metal or wood would have to be cut for it, and their drawings lack the cuts.
-    """
-    through = [reason for reason in why if reason.code is Code.CROSSES_ITSELF]
-    notes = [
-        f"the design passes through itself at {reason.places}: slit the paper there, or trim "
-        "what is inside"
-        for reason in through
-    ]
-    return tuple(reason for reason in why if reason not in through), notes
-
-
 def _length(given: Length | None, name: str, meshes: Sequence[Mesh], unit: str) -> float | None:
     """Return a length; a share is of the diagonal of all designs together."""
     if given is None:
@@ -506,9 +426,24 @@ def _length(given: Length | None, name: str, meshes: Sequence[Mesh], unit: str) 
     return as_length(given, name, diagonal=diagonal, unit=unit)
 
 
-def _words(reasons: Iterable[Reason]) -> list[Json]:
-    """Return records of reasons, the most severe first."""
-    return [reason.record("mm") for reason in ordered(reasons)]
+def _different(finished: Sequence[tuple[float | None, FinishedDesign]]) -> list[Part]:
+    """Return the parts of designs, alike ones once, and say in the records which are the same.
+
+    Parts are the same only if their sheets are: each design comes with the thickness of its own.
+    """
+    of_sheet: dict[float | None, list[Part]] = {}
+    for thick, one in finished:
+        of_sheet.setdefault(thick, []).extend(one.parts)
+    parts: list[Part] = []
+    same: dict[str, str] = {}
+    for some in of_sheet.values():
+        different_parts, also = united(some)
+        parts += different_parts
+        same |= also
+    for _, one in finished:
+        for entry in one.record.get("parts", ()):
+            entry["same_as"] = same.get(entry["name"])
+    return parts
 
 
 def _named(found: dict[int, Made]) -> dict[int, Made]:

@@ -13,6 +13,7 @@ from gso.geometry.polygon import anticlockwise, signed_area
 from gso.geometry.steady import steady
 from gso.quantities import as_positive
 from gso.typing import Array
+from gso.wording import logged
 from gso.workshop import sparrow
 from gso.workshop.part import Drawing, Part
 from gso.workshop.polygons import moved
@@ -134,7 +135,7 @@ def nest(
     >>> len(nested.sheets), len(nested.sheets[0].parts), round(nested.utilisation[0], 2)
     (1, 4, 0.64)
     """
-    say = callback or (lambda said: None)
+    say = logged(callback)
     room = checked_options(sheet, spacing, margin, rotations, seconds)
     _check_parts(parts, method)
     items = [_item(part, rotations, spacing) for part in parts]
