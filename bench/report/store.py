@@ -25,8 +25,10 @@ import gso
 from gso.io import replacing
 
 PACKAGE = Path(gso.__file__).parent
-#: Parts of the package that do not affect the optimiser's figures.
-_ASIDE = ("cli", "dataset", "hybrid", "io", "net", "plot", "rulings")
+#: Parts of the package that do not affect the optimiser's figures: strips and pieces are in no
+#: stored table.
+_ASIDE = ("cli", "dataset", "exact", "hybrid", "io", "mesh_facts", "net", "plot", "recognition")
+_ASIDE += ("ruled", "rulings", "seams", "serving", "sheet_metal", "unfolding", "workshop")
 #: Packages whose versions are reported.
 _PACKAGES = ("numpy", "scipy", "casadi", "libigl", "trimesh", "gso", "numba", "cvxopt")
 _PACKAGES += ("pypardiso", "torch", "matplotlib", "pymeshlab", "vtk")
