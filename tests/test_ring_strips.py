@@ -100,7 +100,21 @@ def test_cones_of_a_closed_body_come_back():
     design = revolved([(0.0, -2.0), (1.0, 0.0), (0.6, 1.5), (0.0, 1.8)], 96)
     result = gso.strips(design, max_deviation="1%")
     assert result.usable and result.ruled.strips == 3
-    assert result.ruled.farthest < 2e-3
+    assert result.ruled.farthest == 0.0
+
+
+def dome(rows: int) -> Mesh:
+    up = np.linspace(0.0, np.pi / 2, rows + 1)[:-1]
+    return revolved([*np.stack([np.cos(up), np.sin(up)], axis=1), (0.0, 1.0)], 48)
+
+
+def test_rows_of_facets_stay_as_they_are_where_they_are_few():
+    # Three rings are within one per cent. The row at the pole is a fan of triangles.
+    exact, near = (gso.strips(dome(rows), max_deviation="1%") for rows in (4, 6))
+    assert exact.usable and exact.ruled.strips == 4 and exact.ruled.farthest == 0.0
+    assert near.usable and near.ruled.strips == 3
+    pieces = gso.pieces(dome(6), max_deviation="1%")
+    assert pieces.usable and len(pieces) == 6 and pieces.metrics["deviation_max"] == 0.0
 
 
 def test_a_flanged_tube_stays_as_it_is(tmp_path):

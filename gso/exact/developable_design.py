@@ -26,6 +26,8 @@ from gso.wording import percent
 EXACT = 1e-6
 #: Difference of lengths, relative to the size, up to which edges are equally long.
 _SAME = 1e-7
+#: How many parts exact rows of facets may be more than parts that are only near the design.
+_MORE = 1
 #: Number of faces from which on no mesh consists of single rows of facets.
 _FINE = 20_000
 #: Angle between normals at both ends of an edge, in radians, up to which it is along a ruling.
@@ -93,6 +95,26 @@ class FoldedPattern:
         part = pattern.mesh.components
         given = np.flatnonzero(pattern.vertex < len(design.vertices))
         return misfit(self.fold()[given], points[given], part[given])
+
+
+def keeps_rows(own: int, others: float) -> bool:
+    """Tell whether a design whose rows of facets are cones stays as it is.
+
+    Rows of a surface that is curved both ways are cones, too, but more than other parts.
+
+    Parameters
+    ----------
+    own : int
+        Number of its parts, which are exact.
+    others : float
+        Number of other parts within the largest distance.
+
+    Examples
+    --------
+    >>> keeps_rows(4, 3), keeps_rows(8, 3)
+    (True, False)
+    """
+    return own <= others + _MORE
 
 
 def folded_pattern(

@@ -63,12 +63,22 @@ class Region:
 def round_regions(graph: FacetGraph, free: Flags) -> list[Region]:
     """Find all cylinders and cones among some triangles (t,); regions do not overlap.
 
-    Whole smooth parts of the mesh are tried first, then the surroundings of every facet.
+    Whole smooth parts of the mesh are tried first, then the surroundings of every facet, and then
+    whole parts of what is left: a fan about an apex is one only without the row around it.
     """
     free = free.copy()
-    found: list[Region] = []
-    smooth = np.abs(graph.folds) <= SMOOTH
-    label = graph.connected(free, smooth)
+    found = _whole_parts(graph, free)
+    for rings in (4, 8) if graph.allowed > graph.step else (2, 1):
+        found += _from_seeds(graph, free, rings)
+    for rings in (2, 1):
+        found += _from_seeds(graph, free, rings, along=True)
+    return [*found, *_whole_parts(graph, free)] if found else found
+
+
+def _whole_parts(graph: FacetGraph, free: Flags) -> list[Region]:
+    """Return the smooth parts of the mesh that are cylinders or cones; `free` is updated."""
+    found = []
+    label = graph.connected(free, np.abs(graph.folds) <= SMOOTH)
     count = np.bincount(label[label >= 0], minlength=1)
     for part in np.argsort(-count, kind="stable")[:_PARTS]:
         if count[part] < 3:
@@ -80,10 +90,6 @@ def round_regions(graph: FacetGraph, free: Flags) -> list[Region]:
         if region is not None:
             found.append(region)
             free &= ~region.member
-    for rings in (4, 8) if graph.allowed > graph.step else (2, 1):
-        found += _from_seeds(graph, free, rings)
-    for rings in (2, 1):
-        found += _from_seeds(graph, free, rings, along=True)
     return found
 
 

@@ -261,9 +261,9 @@ def _exact(
     return replace(out, notes=(*out.notes, exact.as_it_is(found.strain)))
 
 
-def _is_better(exact: Segmentation, other: Segmentation) -> bool:
-    """Whether exact pieces can be used, and are no more than others, if these can be."""
-    return exact.usable and (len(exact) <= len(other) or not other.usable)
+def _is_better(in_rows: Segmentation, other: Segmentation) -> bool:
+    """Whether exact pieces can be used, and are few beside others, if these can be."""
+    return in_rows.usable and (exact.keeps_rows(len(in_rows), len(other)) or not other.usable)
 
 
 def _turned(design: Mesh, distance: float | None) -> Revolution | None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
-from gso.exact import folded_pattern
+from gso.exact import folded_pattern, keeps_rows
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
@@ -79,11 +79,10 @@ def made(
         other = _divided(given, settings, named, workers, exact)
     if exact is not None or not stays or settings.symmetric:
         return other
-    # Rows of a surface that is curved both ways are cones, too, but more than its strips.
     rows = _exact(given, settings, rows=True)
     if rows is None or rows.reasons:
         return other
-    return rows if other.reasons or len(rows.panels) <= len(other.panels) else other
+    return rows if other.reasons or keeps_rows(len(rows.panels), len(other.panels)) else other
 
 
 def _divided(

@@ -11,6 +11,7 @@ import numpy as np
 
 from gso.cut_pieces import Pieces
 from gso.errors import GSOError, MeshError
+from gso.exact import keeps_rows
 from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of
@@ -216,7 +217,9 @@ class StripsTask:
 
     def _answer(self, tried: Sequence[Tried]) -> Result:
         few = self.request.options.number is None
-        best = min([*tried, *self._in_rows(tried)], key=lambda one: one.order(few=few))
+        best = min(tried, key=lambda one: one.order(few=few))
+        if not any(one.ended for one in tried):
+            best = self._or_rows(best)
         if self.request.verdict:
             add_reasons(best.result, best.reasons)
         best.result.notes += shop_notes(best.result)
@@ -304,15 +307,17 @@ class StripsTask:
             return None
         return exact_strips(self.design, self.request, self.kept, rows=rows)
 
-    def _in_rows(self, tried: Sequence[Tried]) -> list[Tried]:
-        """Return the design, if each of its rows of facets is a cone or cylinder.
-
-        Rows of a surface that is curved both ways are cones, too, but more than other strips.
-        """
-        if self._exact is not None or not self._counted or any(one.ended for one in tried):
-            return []
+    def _or_rows(self, best: Tried) -> Tried:
+        """Return the best strips, or the design, if its rows of facets are cones and few."""
+        if self._exact is not None or not self._counted:
+            return best
         result = self._kept_as_it_is(rows=True)
-        return [] if result is None else [self._judged(result)]
+        if result is None:
+            return best
+        own = self._judged(result)
+        if own.holds and best.holds:
+            return own if keeps_rows(own.strips, best.count) else best
+        return min(best, own, key=lambda one: one.order(few=True))
 
     def _judged(self, result: StripsResult) -> Tried:
         reasons = [*judge(result, self.request.limits), *against_parts(result, self.request)]

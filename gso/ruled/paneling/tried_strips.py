@@ -51,7 +51,7 @@ class Tried:
         """
         surface, count = self.result.ruled, 0.0
         if few and self.holds:
-            count = self.strips / (FOLDED if self.creased else 1)
+            count = self.count
         broken = not self.holds and (surface is None or not surface.sound)
         return not self.holds, broken, count, self.far
 
@@ -60,6 +60,11 @@ class Tried:
         """Number of strips."""
         surface = self.result.ruled
         return 0 if surface is None else surface.strips
+
+    @property
+    def count(self) -> float:
+        """Number of strips, as it is compared with those that run across creases."""
+        return self.strips / (FOLDED if self.creased else 1)
 
     @property
     def fewer(self) -> int:
