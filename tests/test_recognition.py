@@ -669,6 +669,19 @@ def test_sphere_and_ellipsoid_are_free(scale, way):
     assert np.abs(flat_edges(shape.flat()) - space).max() < 1e-9
 
 
+def test_rows_of_a_sphere_are_cones_where_that_is_known():
+    grid = sphere_patch(24, 16, 2.8)
+    mesh = Mesh(grid.reshape(-1, 3), Mesh.from_grid(grid).triangles)
+    row = (mesh.triangles % grid.shape[1]).min(axis=1)
+    shape = recognition.recognise(mesh, parts=row)
+    assert len(shape.faces) == grid.shape[1] - 1
+    assert {face.kind for face in shape.faces} <= {"cone", "cylinder"}
+    # Chords of the largest circle span an eighth.
+    away = 70 * (1 - np.cos(1 / 16))
+    assert 0.97 * away < shape.chord < away
+    assert {face.kind for face in recognition.recognise(mesh, parts=0 * row - 1).faces} == {"free"}
+
+
 def test_cylinder_that_ends_in_a_sphere():
     turn = np.linspace(0, 2.5, 25)
     level = np.linspace(-1.0, 0.0, 5)
@@ -742,5 +755,7 @@ def test_bad_options_are_named():
     for option, value in (("max_deviation", -1), ("max_strain", "5mm"), ("bend_step", 0)):
         with pytest.raises(OptionError, match=option):
             recognition.recognise(grid, **{option: value})
+    with pytest.raises(OptionError, match="parts has 3 numbers"):
+        recognition.recognise(grid, parts=[0, 0, 0])
     with pytest.raises(MeshError):
         recognition.recognise(np.full((4, 4, 3), np.nan))

@@ -125,6 +125,24 @@ def test_a_flanged_tube_stays_as_it_is(tmp_path):
     assert len(job.parts) == 3 and job.certificate["designs"][0]["deviation_max"] == 0.0
 
 
+@pytest.mark.parametrize("bound", ["2%", "0.3%"])
+def test_rings_are_rolled(bound, tmp_path):
+    design = ball()
+    job = gso.fabricate(
+        design, tmp_path, max_deviation=bound, unit="m", workers=0, formats=("svg",)
+    )
+    (record,) = job.certificate["designs"]
+    assert job.usable and 0.0 < record["deviation_max"] <= record["allowed"]
+    zones = [part["zones"] for part in record["parts"]]
+    assert all(len(own) == 1 and own[0]["bent_by"] == "roll" for own in zones)
+    # Lengths are those of the circles, not of chords.
+    strips = gso.strips(design, max_deviation=bound)
+    assert strips.ruled.strips == len(zones)
+    area = sum(part["area"] * part["count"] for part in record["parts"])
+    assert area == pytest.approx(1e6 * metrics.area(strips.mesh), rel=2e-3)
+    assert area > 1e6 * metrics.area(strips.mesh)
+
+
 def test_a_needle_has_no_rings_without_radius():
     up = np.linspace(0.0, np.pi, 21)
     needle = revolved(np.stack([0.02 * np.sin(up).round(12), up], axis=1), 24)

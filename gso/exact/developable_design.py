@@ -130,6 +130,7 @@ def folded_pattern(
     unit: str = "mm",
     press_radius: tuple[float, float] | None = None,
     rows: bool = False,
+    parts: ArrayLike | None = None,
 ) -> FoldedPattern | None:
     """Unfold a design that consists of flat, rolled and conical faces.
 
@@ -158,6 +159,8 @@ def folded_pattern(
         Whether single rows of facets with smooth folds between them are cones and cylinders: they
         may be rows of a surface that is curved both ways, too. Not in meshes of more than 20,000
         faces, which are not that coarse.
+    parts : array_like of int, (m,), optional
+        As of :func:`gso.recognition.recognise`.
 
     Returns
     -------
@@ -182,6 +185,7 @@ def folded_pattern(
         bend_step=bend_step,
         unit=unit,
         rows=rows,
+        parts=parts,
     )
     if not shape.developable.all():
         if not is_low_poly(shape):

@@ -6,7 +6,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from gso.errors import OptionError
 from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
 from gso.quantities import Length, Strain, as_length, as_strain
@@ -15,7 +17,7 @@ from gso.recognition.facet_graph import SMOOTH, FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
 from gso.recognition.given_faces import GivenFaces
-from gso.recognition.region_growing import Region, round_regions
+from gso.recognition.region_growing import Region, round_region, round_regions
 from gso.recognition.round_surface import RoundSurface
 from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
@@ -37,6 +39,7 @@ def recognise(
     bend_step: Length | None = None,
     unit: str = "mm",
     rows: bool = False,
+    parts: ArrayLike | None = None,
 ) -> Recognised:
     """Divide a mesh into planes, cylinders, cones, torsal surfaces and free surfaces.
 
@@ -59,6 +62,9 @@ def recognise(
     rows : bool
         Whether single rows of facets between circles are cones and cylinders, too, where the folds
         between them are larger than 5 degrees.
+    parts : array_like of int, (m,), optional
+        Number of the cylinder or cone that each triangle is on, -1 where it is not known. Only for
+        meshes of triangles.
 
     Returns
     -------
@@ -106,7 +112,13 @@ def recognise(
     step = bend_step_of(bend_step, surface.diagonal, unit)
     given = None if surface.attributes is None else surface.attributes.surfaces
     known = GivenFaces.of(graph, given)
-    regions = [*known.regions, *round_regions(graph, known.unknown)]
+    regions = list(known.regions)
+    if parts is not None:
+        regions += _regions_of(graph, np.asarray(parts))
+    unknown = known.unknown.copy()
+    for region in regions:
+        unknown &= ~region.member
+    regions += round_regions(graph, unknown)
     divided = np.arange(len(graph.triangles))
     if given is None:
         graph, divided, regions = divide_at_tangents(graph, regions)
@@ -123,6 +135,17 @@ def recognise(
     faces += known.torsal_faces(graph, source, step)
     faces.sort(key=lambda face: int(face.triangles[0]))
     return Recognised(graph.points, graph.triangles, divided[source], tuple(faces), graph.tolerance)
+
+
+def _regions_of(graph: FacetGraph, parts: Ints) -> list[Region]:
+    """Return the cylinders and cones among parts with known triangles."""
+    if parts.shape != (len(graph.triangles),):
+        raise OptionError(
+            f"parts has {parts.size} numbers for {len(graph.triangles)} triangles; give one for "
+            "each, and a mesh of triangles"
+        )
+    found = (round_region(graph, parts == k) for k in np.unique(parts[parts >= 0]))
+    return [region for region in found if region is not None]
 
 
 def _opened(

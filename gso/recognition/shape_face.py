@@ -113,6 +113,17 @@ class Recognised:
     faces: tuple[ShapeFace, ...]
     tolerance: float
 
+    @property
+    def chord(self) -> float:
+        """Largest distance of an edge's middle from its cylinder or circular cone."""
+        found = [0.0]
+        for face in self.faces:
+            if face.surface is not None:
+                corners = self.vertices[self.triangles[face.triangles]]
+                middle = 0.5 * (corners + np.roll(corners, 1, axis=1))
+                found.append(float(np.abs(face.surface.distances(middle.reshape(-1, 3))).max()))
+        return max(found)
+
     @cached_property
     def face(self) -> Ints:
         """Number of the face of each triangle, (t,)."""

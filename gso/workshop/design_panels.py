@@ -9,17 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
-from gso.exact import folded_pattern, keeps_rows
+from gso.exact import keeps_rows
 from gso.mesh import Mesh
 from gso.mesh.topology import label_components
 from gso.mesh.welding import collapse
-from gso.recognition import Recognised
 from gso.result import StripsResult
 from gso.seams.seam_request import SeamRequest
-from gso.verdict import compare, crosses_itself
-from gso.verdict.surface_checks import crossed
+from gso.verdict import crosses_itself
 from gso.workshop import constrained, measurements
 from gso.workshop.designs import Design
+from gso.workshop.exact_panels import exact_panels, rolled
 from gso.workshop.fabrication_settings import FabricationSettings
 from gso.workshop.matings import alike
 from gso.workshop.mixed_panels import mixed
@@ -28,8 +27,6 @@ from gso.workshop.pattern_panels import of_result, of_surface
 
 #: Length of edges whose ends are joined, relative to the diagonal.
 _SAME = 1e-9
-#: Inner radius, relative to the thickness, up to which bends are bent by a press.
-_PRESSED = 5.0
 
 Say = Callable[[str], None]
 
@@ -59,7 +56,7 @@ def made(
 
     # A design that is developable as it is does not stay where it does not meet constraints.
     stays = constrained.holds(given, given.mesh, soft=True)
-    exact = _exact(given, settings) if stays else None
+    exact = exact_panels(given, settings) if stays else None
     if exact is not None and (
         given.sheet is not None or not exact.reasons or crosses_itself(exact.reasons)
     ):
@@ -79,7 +76,7 @@ def made(
         other = _divided(given, settings, named, workers, exact)
     if exact is not None or not stays or settings.symmetric:
         return other
-    rows = _exact(given, settings, rows=True)
+    rows = exact_panels(given, settings, rows=True)
     if rows is None or rows.reasons:
         return other
     return rows if other.reasons or keeps_rows(len(rows.panels), len(other.panels)) else other
@@ -108,7 +105,7 @@ def _changed(given: Design, settings: FabricationSettings, say: Say, workers: in
     if _is_gored(given, settings):
         allowed = settings.distance(given.mesh.diagonal)
         one = _of_search(given, given.mesh, settings, allowed, say, workers, gored=True)
-        return _checked(one, settings)
+        return measurements.checked(one, settings)
     if settings.formulation == "ruled":
         return _strips(given, settings, say, workers)
     if settings.formulation == "flatten":
@@ -134,7 +131,7 @@ def _mixed(
     """Keep parts of a design, and change the others; None where that is not possible."""
 
     def kept(part: Design, settings: FabricationSettings) -> Made | None:
-        found = _exact(part, settings)
+        found = exact_panels(part, settings)
         return None if found is None or found.reasons else found
 
     def changed(part: Design, settings: FabricationSettings) -> Made:
@@ -144,7 +141,7 @@ def _mixed(
         found = mixed(given, settings, kept, changed)
     except GSOError:
         return None
-    return None if found is None else _checked(found, settings)
+    return None if found is None else measurements.checked(found, settings)
 
 
 def _without_poles(given: Design) -> Design:
@@ -170,75 +167,6 @@ def _without_poles(given: Design) -> Design:
     ends = {name: ids[ids[:, 0] != ids[:, 1]] for name, ids in ends.items()}
     avoid = np.flatnonzero(np.isin(left.kept, given.avoid))
     return replace(given, mesh=joined, avoid=avoid, **ends)
-
-
-def _exact(given: Design, settings: FabricationSettings, *, rows: bool = False) -> Made | None:
-    """Unfold a design that is flat or developable as it is; None if it is not."""
-    thick = given.sheet
-    try:
-        found = folded_pattern(
-            given.mesh,
-            max_strain=settings.strain,
-            cut=given.kept,
-            keep=given.uncut,
-            sheet=settings.max_size or settings.page,
-            # Those than a page are divided in the PDF; a sheet must be large enough.
-            larger=settings.max_size is None,
-            bend_step=settings.bend_step,
-            unit=settings.unit,
-            press_radius=_press_radius(given, settings),
-            rows=rows,
-        )
-    except OptionError:
-        # A face is larger than the sheet.
-        if len(given.uncut):
-            raise
-        return None
-    if found is None:
-        return None
-    record = measurements.of_pattern(
-        given.mesh,
-        found.surface,
-        found.pattern,
-        settings,
-        settings.distance(given.mesh.diagonal),
-        is_kept=True,
-    )
-    # By the equations of the faces: chords of the mesh are shorter than the arcs of the pattern.
-    record |= {
-        "pieces": found.parts,
-        "strain_max": found.strain,
-        "strain_p99": found.strain,
-        "thickness": thick,
-    }
-    made_of = (found.face, _cad_faces(given.mesh, found.recognised))
-    drawn = (found.bends, found.zones, found.seam_angles, made_of)
-    one = of_surface(given.name, found.surface, found.pattern, record, *drawn)
-    panels = tuple(replace(panel, is_kept=True) for panel in one.panels)
-    one = replace(one, panels=panels, reasons=compare(crossed(given.mesh), {}))
-    return _checked(_bent(one), settings)
-
-
-def _cad_faces(mesh: Mesh, shape: Recognised) -> list[tuple[str, ...]]:
-    """Return the names in a CAD file of what each face consists of: the given ones if there are."""
-    said = mesh.attributes
-    if said is None or said.surfaces is None:
-        return [()] * len(shape.faces)
-    given, labels = said.surfaces.of_face, said.labels.get("g")
-    names = [surface.name for surface in said.surfaces.surfaces]
-    if labels is not None:
-        for number, first in zip(*np.unique(given, return_index=True), strict=True):
-            label = int(labels.of_face[first])
-            names[number] = (labels.names[label] if label >= 0 else "") or names[number]
-    own = (np.unique(given[shape.source[face.triangles]]).tolist() for face in shape.faces)
-    return [tuple(names[k] for k in numbers) for numbers in own]
-
-
-def _press_radius(given: Design, settings: FabricationSettings) -> tuple[float, float] | None:
-    """Return the largest radii of mountain and valley bends that a press bends at one line."""
-    if given.sheet is not None:
-        return (_PRESSED + 1) * given.sheet, _PRESSED * given.sheet
-    return None if settings.press is None else (_PRESSED * settings.press,) * 2
 
 
 def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
@@ -276,13 +204,13 @@ def _strips(given: Design, settings: FabricationSettings, say: Say, workers: int
         record["seam_gap"] = result.details["seam_gap"]
     far = result.distances
     record |= {"deviation_mean": far.mean, "deviation_max": far.largest}
-    one = replace(of_result(given.name, result, record), reasons=result.reasons)
-    return _checked(_bent(one), settings)
+    one = rolled(given, result, record, settings) or of_result(given.name, result, record)
+    return measurements.checked(measurements.bent(replace(one, reasons=result.reasons)), settings)
 
 
 def _as_it_is(given: Design, settings: FabricationSettings, say: Say) -> Made:
     """Cut a design whose shape stays into pieces, as far as the strain requires."""
-    return _checked(_of_search(given, given.mesh, settings, None, say, 0), settings)
+    return measurements.checked(_of_search(given, given.mesh, settings, None, say, 0), settings)
 
 
 def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int | None) -> Made:
@@ -315,12 +243,12 @@ def _nearly(given: Design, settings: FabricationSettings, say: Say, workers: int
                 given.mesh, result.mesh, result.pattern, settings, allowed
             )
             one = replace(of_result(given.name, result, record), reasons=result.reasons)
-            tried.append(_checked(_bent(one), settings))
+            tried.append(measurements.checked(measurements.bent(one), settings))
             if not tried[0].reasons:
                 return tried[0]
     try:
         one = _of_search(given, light.mesh, settings, light.allowed, say, workers)
-        tried.append(_checked(one, settings))
+        tried.append(measurements.checked(one, settings))
     except GSOError:
         if not tried:
             raise
@@ -368,20 +296,9 @@ def _of_search(
     one = of_surface(given.name, found.design, pattern, record, found.folded)
     if gored and len(found.alike()) == 1:
         one = replace(one, matings=alike(one.matings))
-    return _bent(replace(one, reasons=found.reasons))
+    return measurements.bent(replace(one, reasons=found.reasons))
 
 
 def _seams(given: Design, settings: FabricationSettings) -> SeamRequest:
     """Return what is asked of the seams of a design."""
     return settings.seams(given.along, given.avoid)
-
-
-def _checked(made: Made, settings: FabricationSettings) -> Made:
-    """Add the reasons against the panels."""
-    return replace(made, reasons=measurements.judge(made, settings))
-
-
-def _bent(made: Made) -> Made:
-    """Measure the smallest radius of all panels."""
-    radius = min(measurements.bend_radius(panel) for panel in made.panels)
-    return replace(made, record=made.record | {"bend_radius_min": radius})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gso import faults, metrics, rulings
@@ -105,6 +107,17 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
         {Code.STRAIN} & {reason.code for reason in later}
     )
     return merge(made.reasons, later, decided)
+
+
+def checked(made: Made, settings: FabricationSettings) -> Made:
+    """Add the reasons against the panels."""
+    return replace(made, reasons=judge(made, settings))
+
+
+def bent(made: Made) -> Made:
+    """Measure the smallest radius of all panels."""
+    radius = min(bend_radius(panel) for panel in made.panels)
+    return replace(made, record=made.record | {"bend_radius_min": radius})
 
 
 def _unmarked_fold(panel: Panel) -> float:

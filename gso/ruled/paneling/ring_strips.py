@@ -32,7 +32,7 @@ REVOLUTION = "revolution"
 #: Number of places of the profile that sides may end near.
 _PLACES = 160
 #: Number of rings that are measured, from the fewest on that the profile allows.
-_TRIED = 3
+_TRIED = 8
 #: Least and largest number of facets of a ring, and the part of the allowed distance that the
 #: facets are to be within of the circle.
 _FACETS, _ROUND = (48, 256), 0.02
@@ -67,7 +67,8 @@ def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsR
     body = Revolution.of(design, allowed)
     if body is None:
         return None
-    aim = wanted(request.options, allowed, 1.0)
+    # Cones are as much farther out than their facets.
+    aim = wanted(request.options, (1.0 - _ROUND) * allowed, 1.0)
     for polygon in _polygons(body.profile, allowed - body.apart, request.options.max_strips):
         inner, most = polygon[1:-1, 0], float(polygon[:, 0].max())
         if inner.min(initial=most) <= _THIN * allowed:

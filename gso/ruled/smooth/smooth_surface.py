@@ -83,9 +83,9 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     Raises
     ------
     MeshError
-        The design was kept as it is, several strips run along lines of a mesh, the surface
-        was read from a file of an earlier version, or its outline cannot be carried over to the
-        smooth strips.
+        The design was kept as it is, several strips run along lines of a mesh or are rings, the
+        surface was read from a file of an earlier version, or its outline cannot be carried over
+        to the smooth strips.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def smooth_strips(surface: RuledSurface, design: Mesh | None = None) -> SmoothSu
     source, mesh = surface.untrimmed, surface.mesh
     if source is None:
         raise MeshError(
-            "strips along lines of a mesh, designs that were kept as they are, and those "
+            "strips along lines of a mesh, rings, designs that were kept as they are, and those "
             "in files of an earlier version, have no smooth surfaces; ask for strips between "
             "rulings (RuledOptions(lines=False), --no-lines), or take the planar faces "
             "(gso.io.save_faces)"
