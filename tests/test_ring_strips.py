@@ -143,6 +143,76 @@ def test_rings_are_rolled(bound, tmp_path):
     assert area > 1e6 * metrics.area(strips.mesh)
 
 
+def within(mesh: Mesh, keep) -> Mesh:
+    """The faces of a mesh whose centres (m, 3) are kept."""
+    shown = mesh.faces[:, :3]
+    faces = mesh.faces[keep(mesh.vertices[shown].mean(axis=1))]
+    used = np.unique(faces[faces >= 0])
+    number = np.full(len(mesh.vertices) + 1, -1)
+    number[used] = np.arange(len(used))
+    return Mesh(mesh.vertices[used], number[faces])
+
+
+def half_ball(rows=24, around=96) -> Mesh:
+    up = np.linspace(0.0, np.pi / 2, rows + 1)[:-1]
+    return revolved([*np.stack([np.cos(up), np.sin(up)], axis=1), (0.0, 1.0)], around)
+
+
+def test_half_of_a_dome_has_half_of_its_rings():
+    whole = gso.strips(half_ball(), max_deviation=0.04)
+    for cut in (half_ball(), half_ball(23, 98)):
+        design = within(cut, lambda p: p[:, 1] > 0.0)
+        half = gso.strips(design, max_deviation=0.04)
+        assert half.usable and half.ruled.strips == whole.ruled.strips, half.reasons
+        assert metrics.area(half.mesh) == pytest.approx(0.5 * metrics.area(whole.mesh), rel=1e-2)
+        assert "part of a body of revolution" in "".join(half.notes)
+        # The outline runs over the pole, which is on no other boundary.
+        (loop,) = half.mesh.boundary_loops
+        plane = half.mesh.vertices[loop]
+        assert np.minimum(np.abs(plane[:, 1]), np.abs(plane[:, 2])).max() < 0.01
+
+
+def test_openings_are_cut_out_of_rings():
+    def kept(p):
+        door = (p[:, 0] > 0.0) & (np.abs(p[:, 1]) < 0.2) & (p[:, 2] < 0.5)
+        window = (p[:, 0] < 0.0) & (np.abs(p[:, 1]) < 0.2) & (np.abs(p[:, 2] - 0.2) < 0.12)
+        return ~(door | window)
+
+    design = within(half_ball(32, 128), kept)
+    result = gso.strips(design, max_deviation=0.03)
+    assert result.usable, result.reasons
+    assert result.ruled.strips == gso.strips(half_ball(), max_deviation=0.03).ruled.strips
+    assert metrics.area(result.mesh) == pytest.approx(metrics.area(design), rel=0.02)
+    given, made = ([len(m.boundary_loops)] for m in (design, result.mesh))
+    assert given == made == [2]
+    # The window is within a ring, which the door opens: it is a hole of the pattern.
+    parts = result.pattern.mesh.components.max() + 1
+    assert len(result.pattern.mesh.boundary_loops) == parts + 1
+    for loop in result.mesh.boundary_loops:
+        off = metrics.point_to_surface(result.mesh.vertices[loop], design)
+        assert off.max() <= 0.03
+
+
+def test_most_of_a_torus_becomes_rings():
+    turn = 2 * np.pi * np.arange(40) / 40
+    angle = np.linspace(0.0, 1.7 * np.pi, 62)[:, None]
+    radius = 3.0 - np.cos(turn)
+    points = np.broadcast_arrays(radius * np.cos(angle), radius * np.sin(angle), np.sin(turn))
+    k = np.arange(61 * 40)
+    after = k - k % 40 + (k + 1) % 40
+    pipe = Mesh(np.stack(points, -1).reshape(-1, 3), np.stack([k, k + 40, after + 40, after], 1))
+    result = gso.strips(pipe, max_deviation="1%")
+    assert result.usable and result.details["rulings_from"] == "revolution"
+    assert len(result.mesh.boundary_loops) == 2
+    assert metrics.area(result.mesh) == pytest.approx(0.85 * 4 * np.pi**2 * 3.0, rel=0.05)
+
+
+def test_a_square_of_a_ball_is_no_part_of_a_turned_body():
+    x, y = np.meshgrid(*[np.linspace(-0.4, 0.4, 17)] * 2)
+    sail = gso.strips(np.dstack([x, y, np.sqrt(1.0 - x**2 - y**2)]), max_deviation="1%")
+    assert sail.usable and "revolution" not in "".join(sail.notes)
+
+
 def test_a_needle_has_no_rings_without_radius():
     up = np.linspace(0.0, np.pi, 21)
     needle = revolved(np.stack([0.02 * np.sin(up).round(12), up], axis=1), 24)

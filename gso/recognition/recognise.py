@@ -17,7 +17,7 @@ from gso.recognition.facet_graph import SMOOTH, FacetGraph
 from gso.recognition.flat_and_torsal import Patch, other_patches
 from gso.recognition.flat_images import Part, developed, plane_image, round_image
 from gso.recognition.given_faces import GivenFaces
-from gso.recognition.region_growing import Region, round_region, round_regions
+from gso.recognition.region_growing import Region, known_region, round_regions
 from gso.recognition.round_surface import RoundSurface
 from gso.recognition.ruling_cut import cut_along, opening_angle
 from gso.recognition.shape_face import Recognised, ShapeFace
@@ -144,7 +144,7 @@ def _regions_of(graph: FacetGraph, parts: Ints) -> list[Region]:
             f"parts has {parts.size} numbers for {len(graph.triangles)} triangles; give one for "
             "each, and a mesh of triangles"
         )
-    found = (round_region(graph, parts == k) for k in np.unique(parts[parts >= 0]))
+    found = (known_region(graph, parts == k) for k in np.unique(parts[parts >= 0]))
     return [region for region in found if region is not None]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gso.geometry import box_diagonal
 from gso.mesh import topology
 from gso.recognition.facet_graph import SMOOTH, FacetGraph
-from gso.recognition.region_members import LOOSE, members
+from gso.recognition.region_members import LOOSE, members, triangle_spans
 from gso.recognition.round_surface import RoundSurface, fit_quadrics, fit_round
 from gso.recognition.smooth_regions import is_smooth
 from gso.typing import Array, Flags, Ints
@@ -97,6 +97,33 @@ def round_region(graph: FacetGraph, member: Flags) -> Region | None:
     """Fit a cylinder or cone to all of some triangles (t,); None if they are on none."""
     found = _best(graph, member, member, np.zeros(0, bool), None)
     return found if found is not None and (found.member == member).all() else None
+
+
+def known_region(graph: FacetGraph, member: Flags) -> Region | None:
+    """Fit a cylinder or cone to facets that are known to be on one; None if they are on none.
+
+    Vertices within its facets are inside of it, such as those of an outline that cuts them.
+
+    Parameters
+    ----------
+    graph : FacetGraph
+    member : ndarray of bool, (t,)
+    """
+    triangles = graph.triangles[member]
+    facet = np.repeat(graph.facet[member], 3)
+    pairs = np.unique(np.stack([triangles.ravel(), facet], axis=1), axis=0)
+    every, several = np.unique(pairs[:, 0], return_counts=True)
+    for conical in (False, True):
+        surface = _fitted_to(graph, every[several > 1], member, None, conical)
+        if surface is None:
+            continue
+        angle, rho, _ = surface.coordinates(graph.points)
+        span = float(triangle_spans(surface, angle, rho, triangles).max())
+        sag = float(rho[every].max()) * (1.0 - np.cos(0.5 * span))
+        off = surface.distances(graph.points[every])
+        if off.max() <= LOOSE * graph.tolerance and off.min() >= -sag - LOOSE * graph.tolerance:
+            return Region(surface, member)
+    return None
 
 
 def _from_seeds(graph: FacetGraph, free: Flags, rings: int, *, along: bool = False) -> list[Region]:
@@ -316,6 +343,13 @@ def _fitted(
         ids = ids[before.distances(graph.points[ids]) >= -LOOSE * graph.tolerance]
     elif graph.shared[ids].sum() >= _FEWEST + conical:
         ids = ids[graph.shared[ids]]
+    return _fitted_to(graph, ids, member, axis, conical)
+
+
+def _fitted_to(
+    graph: FacetGraph, ids: Ints, member: Flags, axis: Array | None, conical: bool
+) -> RoundSurface | None:
+    """Fit a surface to some vertices of a region; None where they are few, or far from any."""
     if len(ids) < _FEWEST + conical:
         return None
     ids = ids[np.linspace(0, len(ids) - 1, min(len(ids), _ENOUGH)).round().astype(int)]

@@ -9,8 +9,8 @@ import numpy as np
 
 from gso.errors import OptionError
 from gso.exact import FoldedPattern, folded_pattern
+from gso.geometry.ears import divided
 from gso.mesh import Mesh
-from gso.mesh.topology import are_quads
 from gso.recognition import Recognised
 from gso.result import Result
 from gso.typing import Ints, Json
@@ -72,11 +72,14 @@ def rolled(
     surface = result.ruled
     if surface is None or result.details.get("rulings_from") != REVOLUTION or len(given.kept):
         return None
-    faces, strip = surface.mesh.faces, surface.strip
-    quad = np.flatnonzero(are_quads(faces))
-    triangles = np.concatenate([faces[:, :3], faces[quad][:, [0, 2, 3]]])
-    mesh = Mesh(surface.mesh.vertices, triangles)
-    found = _folded(given, mesh, settings, parts=np.concatenate([strip, strip[quad]]))
+    points, faces = surface.mesh.vertices, surface.mesh.faces
+    triangles, owner = divided([face[face >= 0] for face in faces], points)
+    mesh = Mesh(points, triangles)
+    part, he = surface.strip[owner], mesh.half_edges
+    inner = he.interior
+    joint = inner[part[he.face[inner]] != part[he.face[he.twin[inner]]]]
+    between = np.stack([he.origin[joint], he.dest[joint]], axis=1)
+    found = _folded(replace(given, kept=between), mesh, settings, parts=part)
     if found is None or found.parts != surface.strips:
         return None
     far = record["deviation_max"] + found.recognised.chord

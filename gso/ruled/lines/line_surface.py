@@ -21,7 +21,11 @@ from gso.typing import Array, Flags, Ints
 
 
 def line_surface(
-    design: Mesh, polygons: Polygons, points: Array, ends: Ints | None = None
+    design: Mesh,
+    polygons: Polygons,
+    points: Array,
+    ends: Ints | None = None,
+    opened: Ints | None = None,
 ) -> RuledSurface:
     """Make a ruled surface of planar polygons, and unroll it.
 
@@ -35,6 +39,9 @@ def line_surface(
     ends : ndarray of int, (p + 1, 2), optional
         Of a single strip, the ends of the rulings before, between and after the polygons, with
         which smooth surfaces can be made of it.
+    opened : ndarray of int, (k, 2), optional
+        Rulings along which strips are cut open that close around; there must be some in each of
+        these. By default strips with several ways around are cut until there is one.
     """
     used = np.unique(np.concatenate(polygons.rings))
     number = np.full(len(points), -1)
@@ -46,7 +53,12 @@ def line_surface(
     faces = faces[:, : mesh.faces.shape[1]]
     planes = _Planes.of(rings, vertices)
     hinges, creases = _edges(rings, number[polygons.rulings])
-    tree = _tree(hinges, vertices, len(rings))
+    if opened is None:
+        tree = _tree(hinges, vertices, len(rings))
+    else:
+        count = len(vertices)
+        cut = topology.pair_keys(number[opened], count)
+        tree = ~np.isin(topology.pair_keys(hinges[:, 2:], count), cut)
     table, flat, part = _unrolled(planes, rings, vertices, hinges, tree, faces, owner)
     vertex = np.empty(len(flat), np.int64)
     inside = table >= 0
@@ -172,7 +184,9 @@ def _unrolled(
 
     count = len(rings)
     joined = hinges[tree]
-    graph = topology.edge_graph(count, joined[:, 0], joined[:, 1], np.arange(1.0, len(joined) + 1))
+    # Two polygons may meet along several edges.
+    first = np.unique(np.sort(joined[:, :2], axis=1), axis=0, return_index=True)[1]
+    graph = topology.edge_graph(count, joined[first, 0], joined[first, 1], first + 1.0)
     graph = graph + graph.T
     part = topology.label_components(count, joined[:, 0], joined[:, 1])
     turn, shift = np.ones(count, complex), np.zeros(count, complex)

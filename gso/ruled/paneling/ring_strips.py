@@ -3,7 +3,8 @@
 The profile becomes the polygon with the least largest distance, for a number of sides, among those
 with corners near points of it. Each side is the straight line in the middle of what it replaces,
 so that the rings are as far inside of the body as outside. The circles of its boundary stay, so
-that it fits what is joined there.
+that it fits what is joined there. Rings of a part of a body, such as a dome with a door, are cut
+along its outline.
 """
 
 from __future__ import annotations
@@ -17,13 +18,11 @@ import numpy as np
 from gso.geometry.polygon import arc_lengths, points_at
 from gso.mesh import Mesh
 from gso.result import StripsResult
-from gso.ruled.lines.line_surface import line_surface
-from gso.ruled.lines.polygons import Polygons
 from gso.ruled.paneling.made_strips import made_strips
+from gso.ruled.paneling.ring_surface import ROUND, RingSurface
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.surface_strips import wanted
-from gso.ruled.ruled_surface import RuledSurface
-from gso.seams.revolution import Revolution, directions
+from gso.seams.revolution import Revolution
 from gso.status import Status
 from gso.typing import Array, Ints
 
@@ -33,9 +32,6 @@ REVOLUTION = "revolution"
 _PLACES = 160
 #: Number of rings that are measured, from the fewest on that the profile allows.
 _TRIED = 8
-#: Least and largest number of facets of a ring, and the part of the allowed distance that the
-#: facets are to be within of the circle.
-_FACETS, _ROUND = (48, 256), 0.02
 #: Largest move of a corner of the polygon along a side, relative to the side's length.
 _MOVED = 0.5
 #: Radius of a ring's end within the body, relative to the allowed distance, up to which it closes.
@@ -48,7 +44,9 @@ _TINY = float(np.sqrt(np.finfo(float).tiny))
 
 
 def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsResult | None:
-    """Make rings of a body of revolution, as few as are within a distance, without a verdict.
+    """Make rings of a body of revolution or of a part of one, without a verdict.
+
+    They are as few as are within a distance.
 
     Parameters
     ----------
@@ -61,34 +59,39 @@ def ring_strips(design: Mesh, allowed: float, request: StripsRequest) -> StripsR
     Returns
     -------
     StripsResult or None
-        None if the design is no body of revolution, or rings do not hold the bounds.
+        None if the design is no part of a body of revolution, or rings do not hold the bounds.
     """
     clock = time.perf_counter()
-    body = Revolution.of(design, allowed)
+    body, is_part = Revolution.of(design, allowed), False
+    if body is None:
+        body, is_part = Revolution.with_part(design, allowed), True
     if body is None:
         return None
     # Cones are as much farther out than their facets.
-    aim = wanted(request.options, (1.0 - _ROUND) * allowed, 1.0)
+    aim = wanted(request.options, (1.0 - ROUND) * allowed, 1.0)
     for polygon in _polygons(body.profile, allowed - body.apart, request.options.max_strips):
         inner, most = polygon[1:-1, 0], float(polygon[:, 0].max())
         if inner.min(initial=most) <= _THIN * allowed:
             # A needle, or a neck that closes.
             continue
-        surface = _rings(design, body, polygon, allowed)
+        rings = RingSurface(design, body, polygon, allowed)
+        surface = rings.within_outline() if is_part else rings.whole()
+        if surface is None:
+            return None
         if aim.met(surface):
             far = surface.deviation
             mean = 0.0 if far is None else far.mean
-            status, notes = Status.CONVERGED, [_said(surface.strips)]
+            status, notes = Status.CONVERGED, [_said(surface.strips, is_part)]
             return made_strips(
                 design, surface, status, REVOLUTION, begun=clock, mean=mean, notes=notes
             )
     return None
 
 
-def _said(count: int) -> str:
+def _said(count: int, is_part: bool) -> str:
     """Return a note on rings."""
-    rings = "one ring" if count == 1 else f"{count} rings"
-    return f"the design is a body of revolution: {rings}, each part of a cone about its axis"
+    rings, part = "one ring" if count == 1 else f"{count} rings", "part of " if is_part else ""
+    return f"the design is {part}a body of revolution: {rings}, each part of a cone about its axis"
 
 
 def _polygons(profile: Array, allowed: float, most: int) -> Iterator[Array]:
@@ -270,39 +273,3 @@ def _polygon(line: Array, corners: Ints, sides: _Sides) -> Array:
             out[at, 0] = 0.0
     out[:, 0] = np.maximum(out[:, 0], 0.0)
     return np.asarray(out)
-
-
-def _rings(design: Mesh, body: Revolution, polygon: Array, allowed: float) -> RuledSurface:
-    """Return the surface of revolution of a polygon, with facets around, near a design.
-
-    The facets are as far inside of the circles as outside.
-    """
-    radius = float(polygon[:, 0].max())
-    count = int(np.ceil(np.pi / np.sqrt(2.0 * _ROUND * allowed / radius)))
-    count = int(np.clip(count, *_FACETS))
-    turn = 2.0 * np.pi * np.arange(count) / count
-    one, two = directions(design, body.origin, body.axis)
-    round_it = np.cos(turn)[:, None] * one + np.sin(turn)[:, None] * two
-    out = 2.0 / (1.0 + np.cos(np.pi / count)) * polygon[:, :1, None]
-    points = (out * round_it + polygon[:, 1:, None] * body.axis + body.origin).reshape(-1, 3)
-    rows = len(polygon) - 1
-    ids = np.arange((rows + 1) * count).reshape(rows + 1, count)
-    on_axis = polygon[:, 0] == 0.0
-    ids[on_axis] = ids[on_axis, :1]
-    closed = _is_closed(polygon)
-    if closed:
-        ids[-1] = ids[0]
-    after = np.roll(ids, -1, axis=1)
-    # The normals are on the left of the profile.
-    corners = np.stack([ids[:-1], ids[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
-    different = corners != np.roll(corners, 1, axis=1)
-    none = np.empty((0, 3), np.int64)
-    polygons = Polygons(
-        rings=[ring[own] for ring, own in zip(corners, different, strict=True)],
-        strip=np.repeat(np.arange(rows), count),
-        rulings=np.stack([ids[:-1], ids[1:]], axis=-1).reshape(-1, 2),
-        creases=np.stack([ids, after], axis=-1)[0 if closed else 1 : -1].reshape(-1, 2),
-        lines=none,
-        across=none,
-    )
-    return line_surface(design, polygons, points).measured(design)
