@@ -194,4 +194,5 @@ def _centre(weight: Array, middle: Array, normal: Array) -> Array:
     """Return the point that is nearest to some normal lines: the centre of a ball."""
     across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
     total = np.einsum("m,mde->de", weight, across)
-    return np.linalg.lstsq(total, np.einsum("m,mde,me->d", weight, across, middle), rcond=1e-9)[0]
+    right = np.einsum("m,mde,me->d", weight, across, middle)
+    return np.asarray(np.linalg.lstsq(total, right, rcond=1e-9)[0])

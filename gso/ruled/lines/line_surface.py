@@ -186,7 +186,8 @@ def _unrolled(
     joined = hinges[tree]
     # Two polygons may meet along several edges.
     first = np.unique(np.sort(joined[:, :2], axis=1), axis=0, return_index=True)[1]
-    graph = topology.edge_graph(count, joined[first, 0], joined[first, 1], first + 1.0)
+    number = np.arange(1.0, len(joined) + 1)[first]
+    graph = topology.edge_graph(count, joined[first, 0], joined[first, 1], number)
     graph = graph + graph.T
     part = topology.label_components(count, joined[:, 0], joined[:, 1])
     turn, shift = np.ones(count, complex), np.zeros(count, complex)
@@ -214,8 +215,8 @@ def _unrolled(
     )
     label = topology.label_components(len(ids), one, two)
     z = turn[cell] * planes.local(cell, vertices[ids]) + shift[cell]
-    number = np.bincount(label)
-    flat = np.stack([np.bincount(label, x) / number for x in (z.real, z.imag)], axis=1)
+    size = np.bincount(label)
+    flat = np.stack([np.bincount(label, x) / size for x in (z.real, z.imag)], axis=1)
     of = np.empty(len(flat), np.int64)
     of[label] = part[cell]
     pieces = [upright(flat[of == k]) for k in range(int(part.max()) + 1)]

@@ -66,7 +66,7 @@ class RingSurface:
     def whole(self) -> RuledSurface:
         """Return the whole surface."""
         rows, count = len(self.polygon) - 1, self.count
-        points = self._at(np.arange(count), np.arange(rows + 1)[:, None]).reshape(-1, 3)
+        points = self._at(np.arange(1.0 * count), np.arange(rows + 1.0)[:, None]).reshape(-1, 3)
         ids = np.arange((rows + 1) * count).reshape(rows + 1, count)
         on_axis = self.polygon[:, 0] == 0.0
         ids[on_axis] = ids[on_axis, :1]
@@ -114,9 +114,9 @@ class RingSurface:
         return len(self.polygon) - 1
 
     def _at(self, turn: Array, level: Array) -> Array:
-        """Return the points (..., 3) at whole numbers of facets, and of sides of the polygon.
+        """Return points (..., 3) by numbers of facets and of sides of the polygon.
 
-        Between the ends of facets or sides both are places along them.
+        Whole numbers are their beginnings, and fractions are places along them.
         """
         whole, row = np.floor(turn), np.minimum(np.floor(level), self._rows - 1).astype(int)
         part = (level - row)[..., None]
@@ -147,14 +147,7 @@ class RingSurface:
         half = np.pi / self.count
         share = 0.5 + np.tan((turned - facet[of_piece] - 0.5) * 2.0 * half) / (2.0 * np.tan(half))
         along = np.where(on_ruling, turned, facet[of_piece] + share)
-        key = np.stack([np.round(turned / _STEP), np.round(level / _STEP)], axis=1)
-        key[:, 0] %= np.round(self.count / _STEP)
-        key[on_level, 1] = -1.0 - end[on_level]
-        if self.is_closed:
-            key[on_level & (end == self._rows), 1] = -1.0
-        key[on_level & (self.polygon[end % (self._rows + 1), 0] == 0.0), 0] = 0.0
-        _, first, ids = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        ids = ids.ravel()
+        first, ids = self._same(turned, level, np.where(on_level, end, -1))
         points = self._at(along[first], number[first])
         begins = np.flatnonzero(np.diff(of_piece, prepend=-1))
         rings = [_without_repeats(ring) for ring in np.split(ids, begins[1:])]
@@ -168,12 +161,29 @@ class RingSurface:
         around, long = np.round(turned).astype(int) % self.count, np.abs(level[after] - level)
         opened = self._opened(edges, around, long, own, same_ruling)
         polygons = _polygons(
-            [ring for ring, own in zip(rings, keep, strict=True) if own],
+            [ring for ring, sound in zip(rings, keep, strict=True) if sound],
             row[np.array(keep)],
             rulings,
             edges[same_level & (ids != ids[after])],
         )
         return line_surface(self.design, polygons, points, opened=opened).measured(self.design)
+
+    def _same(self, turn: Array, level: Array, end: Ints) -> tuple[Ints, Ints]:
+        """Return the first of all corners that are the same, and the number of each (n,).
+
+        Parameters
+        ----------
+        turn, level : ndarray, (n,)
+        end : ndarray of int, (n,)
+            Corner of the polygon, -1 between two.
+        """
+        key = np.stack([np.round(turn / _STEP), np.round(level / _STEP)], axis=1)
+        key[:, 0] %= np.round(self.count / _STEP)
+        there = end >= 0
+        key[there, 1] = -1.0 - (end[there] % self._rows if self.is_closed else end[there])
+        key[there & (self.polygon[end, 0] == 0.0), 0] = 0.0
+        _, first, ids = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        return first, ids.ravel()
 
     def _opened(self, edges: Ints, turn: Ints, long: Array, row: Ints, is_ruling: Flags) -> Ints:
         """Return the rulings (k, 2) along which rings are opened that close around the axis.
@@ -280,7 +290,7 @@ def _copies(place: Array, period: Sequence[float]) -> tuple[list[int], list[int]
 
 def _without_repeats(ring: Ints) -> Ints:
     """Leave out corners that are the same as the one before."""
-    return ring[ring != np.roll(ring, 1)]
+    return np.asarray(ring[ring != np.roll(ring, 1)])
 
 
 def _polygons(rings: list[Ints], strip: Ints, rulings: Ints, creases: Ints) -> Polygons:
