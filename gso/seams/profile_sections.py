@@ -45,10 +45,11 @@ _FEW, _MANY = 500, 5_000
 _FINE = 0.005
 #: Sine of the angle up to which an edge is along a circle about the axis, or in a plane with it.
 _ALONG = 0.05
-#: Share of the boundary of a part of a body that is along circles and in planes with the axis.
-_MOSTLY = 0.5
-#: Length of sections, over that of the longest, from which on they are as long.
-_LONG = 1.0 - 1e-6
+#: Share of the boundary of a part of a body that is along circles and in planes with the axis, or
+#: of sections that are nearly whole.
+MOSTLY = 0.5
+#: Length of sections, over that of the longest, from which on they are as long, or nearly.
+_LONG, _NEARLY = 1.0 - 1e-6, 0.9
 
 
 def directions(mesh: Mesh, origin: Array, axis: Array) -> tuple[Array, Array]:
@@ -63,6 +64,18 @@ def directions(mesh: Mesh, origin: Array, axis: Array) -> tuple[Array, Array]:
     two = np.cross(axis, one)
     c, s = np.cos(_BESIDE), np.sin(_BESIDE)
     return c * one + s * two, c * two - s * one
+
+
+def aligned(mesh: Mesh, origin: Array, axis: Array) -> float:
+    """Return the share of a boundary along circles about an axis and in planes with it."""
+    he = mesh.half_edges
+    rim = he.twin < 0
+    a, b = (mesh.vertices[end[rim]] - origin for end in (he.origin, he.dest))
+    size = lengths(b - a)
+    round_it = unit(np.cross(axis, 0.5 * (a + b)))
+    share = np.abs(np.einsum("kd,kd->k", b - a, round_it)) / np.maximum(size, 1e-300)
+    known = (share <= _ALONG) | (share >= np.sqrt(1.0 - _ALONG**2))
+    return float(size[known].sum() / max(float(size.sum()), 1e-300))
 
 
 class Sections:
@@ -123,16 +136,17 @@ class Sections:
         """Return the profile of a body of which the mesh is a part, as :meth:`profile`.
 
         At least half of the boundary is along circles about the axis or in planes with it, such as
-        that of a dome with a door, and some sections are whole.
+        that of a dome with a door, or most sections are nearly as long as the longest.
         """
-        if self._aligned < _MOSTLY:
-            return None
         known = [self.section(turn, _FINE * distance) for turn in self._turns]
         lines = [line for line in known if line is not None]
         if len(lines) < _WHOLE_ONES:
             return None
-        long = [arc_lengths(line)[-1] for line in lines]
-        line = lines[int(np.argmax(np.array(long) >= _LONG * max(long)))]
+        long = np.array([arc_lengths(line)[-1] for line in lines])
+        line = lines[int((long >= _LONG * long.max()).argmax())]
+        around = (long >= _NEARLY * long.max()).sum() >= MOSTLY * _SECTIONS
+        if not around and aligned(self.mesh, self.origin, self.axis) < MOSTLY:
+            return None
         if self._is_off(line, distance):
             return None
         found = self._mean(line, lines, distance)
@@ -141,18 +155,6 @@ class Sections:
     @property
     def _turns(self) -> list[float]:
         return [2.0 * np.pi * k / _SECTIONS for k in range(_SECTIONS)]
-
-    @property
-    def _aligned(self) -> float:
-        """Share of the boundary along circles about the axis and in planes with it."""
-        he = self.mesh.half_edges
-        rim = he.twin < 0
-        a, b = (self.mesh.vertices[end[rim]] - self.origin for end in (he.origin, he.dest))
-        size = lengths(b - a)
-        round_it = unit(np.cross(self.axis, 0.5 * (a + b)))
-        share = np.abs(np.einsum("kd,kd->k", b - a, round_it)) / np.maximum(size, 1e-300)
-        known = (share <= _ALONG) | (share >= np.sqrt(1.0 - _ALONG**2))
-        return float(size[known].sum() / max(float(size.sum()), 1e-300))
 
     def _is_off(self, line: Array, distance: float) -> bool:
         """Tell whether some vertex is farther from a section than from any profile."""

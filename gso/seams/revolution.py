@@ -20,7 +20,7 @@ from gso.geometry import doubled_areas
 from gso.geometry.vectors import cross, unit
 from gso.mesh import Mesh
 from gso.mesh.separation import centres
-from gso.seams.profile_sections import Sections
+from gso.seams.profile_sections import MOSTLY, Sections, aligned
 from gso.typing import Array, Flags
 
 #: Largest root mean square of the normals' components along the circles about an axis, and the
@@ -29,6 +29,9 @@ _TURNED, _RATIO, _EXTRA = 0.3, 2.0, 0.02
 #: Difference of the second moments of an axis from the others, over the largest one, from which on
 #: it is unique; the same of the least eigenvalue of the linear complex: a ratio.
 _GAP, _UNIQUE, _ROUNDING = 0.02, 4.0, 1e-9
+#: Boundary loops, and places on each, whose planes are tried for parts of a ball, and the number of
+#: their axes that are taken.
+_LOOPS, _PLACES, _TRIED = 4, 32, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +151,11 @@ def _axes(mesh: Mesh, *, part: bool = False) -> list[tuple[Array, Array]]:
     of_normals = _of_normals(weight, middle, normal, mesh.diagonal)
     if part:
         centre = _centre(weight, middle, normal)
-        upright = [*np.eye(3)[::-1], unit(centroid - centre)]
-        found = of_normals + [(centre, axis) for axis in upright]
+        upright = [*np.eye(3)[::-1], unit(centroid - centre), *_across_boundary(mesh)]
+        share = np.array([aligned(mesh, centre, axis) for axis in upright])
+        # Of nearly equal ones those along the axes of the coordinates come first.
+        order = np.argsort(-np.where(share < MOSTLY, 0.0, share.round(1)), kind="stable")
+        found = of_normals + [(centre, upright[k]) for k in order[:_TRIED]]
     else:
         principal, single = _principal(mesh, weight, middle, centroid)
         found = [(centroid, axis) for axis in principal.T[single]] + of_normals
@@ -188,6 +194,17 @@ def _principal(mesh: Mesh, weight: Array, middle: Array, centroid: Array) -> tup
     level, principal = np.linalg.eigh(moments)
     gap = np.diff(level) > _GAP * level[-1]
     return principal, np.array([gap[0], gap[0] and gap[1], gap[1]])
+
+
+def _across_boundary(mesh: Mesh) -> Array:
+    """Return the normals (k, 3) of planes through points of the boundary near each other."""
+    found = [np.empty((0, 3))]
+    for loop in mesh.boundary_loops[:_LOOPS]:
+        step = max(len(loop) // _PLACES, 1)
+        points = mesh.vertices[loop]
+        ways = np.roll(points, -step, axis=0) - points
+        found.append(np.cross(ways, np.roll(ways, -step, axis=0))[::step])
+    return unit(np.concatenate(found))
 
 
 def _centre(weight: Array, middle: Array, normal: Array) -> Array:

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 #: Least and largest number of facets of a ring, and the part of the allowed distance that the
 #: facets are to be within of the circle.
 _FACETS, ROUND = (48, 256), 0.02
-#: Distance of the outline from the ends of the polygon and from the axis, over the allowed one, up
+#: Distance of the outline from the ends of the polygon, and from the axis, over the allowed one, up
 #: to which it is there.
-_AT_END = 0.1
+_AT_END, _ON_AXIS = 0.1, 0.5
 #: Step to which places on the surface are rounded, in facets and in lengths of the polygon.
 _STEP = 1e-7
 #: Largest number of face centres by which the inside of the outline is found.
@@ -246,7 +246,7 @@ class RingSurface:
         They go on over whole turns. At a vertex on the axis there are two.
         """
         turn, level, radius = self._located(self.design.vertices[loop])
-        on_axis = radius <= _AT_END * self.allowed
+        on_axis = radius <= _ON_AXIS * self.allowed
         if on_axis.all():
             return None
         # From a vertex off the axis back to it.
