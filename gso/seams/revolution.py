@@ -93,8 +93,8 @@ class Revolution:
     def with_part(cls, mesh: Mesh, distance: float) -> Revolution | None:
         """Find the body of revolution of which a mesh is a part; None if there is none.
 
-        At least half of the boundary is along circles about the axis or in planes with it: a dome
-        with a door, or half of a vase.
+        At least half of the boundary is along circles about the axis or in planes with it, or most
+        sections are nearly as long as the longest: a dome with a door, or half of a vase.
 
         Parameters
         ----------
