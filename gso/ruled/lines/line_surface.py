@@ -215,8 +215,8 @@ def _unrolled(
     )
     label = topology.label_components(len(ids), one, two)
     z = turn[cell] * planes.local(cell, vertices[ids]) + shift[cell]
-    size = np.bincount(label)
-    flat = np.stack([np.bincount(label, x) / size for x in (z.real, z.imag)], axis=1)
+    uses = np.bincount(label)
+    flat = np.stack([np.bincount(label, x) / uses for x in (z.real, z.imag)], axis=1)
     of = np.empty(len(flat), np.int64)
     of[label] = part[cell]
     pieces = [upright(flat[of == k]) for k in range(int(part.max()) + 1)]
