@@ -18,9 +18,9 @@ from gso.typing import AnyPath, Json
 HOURS = {
     "developable": 3.0,
     "flatten-strain": 1.25,
-    "net-c": 1.5,
+    "net-c": 2.35,
     "net-f": 0.75,
-    "flatten": 0.75,
+    "flatten": 1.25,
     "denoise": 0.75,
     "net-s": 0.75,
     "flatten-w": 0.75,
