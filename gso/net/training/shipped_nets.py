@@ -23,7 +23,7 @@ HOURS = {
     "flatten": 1.25,
     "denoise": 0.75,
     "net-s": 0.75,
-    "flatten-w": 0.75,
+    "flatten-w": 0.5,
 }
 #: Settings of a configuration that name another net.
 _NETS = ("init", "through", "teacher")
