@@ -125,9 +125,8 @@ def test_a_flanged_tube_stays_as_it_is(tmp_path):
     assert len(job.parts) == 3 and job.certificate["designs"][0]["deviation_max"] == 0.0
 
 
-@pytest.mark.parametrize("bound", ["2%", "0.3%"])
-def test_rings_are_rolled(bound, tmp_path):
-    design = ball()
+def test_rings_are_rolled(tmp_path):
+    design, bound = ball(24, 64), "0.8%"
     job = gso.fabricate(
         design, tmp_path, max_deviation=bound, unit="m", workers=0, formats=("svg",)
     )
@@ -160,16 +159,15 @@ def half_ball(rows=24, around=96) -> Mesh:
 
 def test_half_of_a_dome_has_half_of_its_rings():
     whole = gso.strips(half_ball(), max_deviation=0.04)
-    for cut in (half_ball(), half_ball(23, 98)):
-        design = within(cut, lambda p: p[:, 1] > 0.0)
-        half = gso.strips(design, max_deviation=0.04)
-        assert half.usable and half.ruled.strips == whole.ruled.strips, half.reasons
-        assert metrics.area(half.mesh) == pytest.approx(0.5 * metrics.area(whole.mesh), rel=1e-2)
-        assert "part of a body of revolution" in "".join(half.notes)
-        # The outline runs over the pole, which is on no other boundary.
-        (loop,) = half.mesh.boundary_loops
-        plane = half.mesh.vertices[loop]
-        assert np.minimum(np.abs(plane[:, 1]), np.abs(plane[:, 2])).max() < 0.01
+    design = within(half_ball(23, 98), lambda p: p[:, 1] > 0.0)
+    half = gso.strips(design, max_deviation=0.04)
+    assert half.usable and half.ruled.strips == whole.ruled.strips, half.reasons
+    assert metrics.area(half.mesh) == pytest.approx(0.5 * metrics.area(whole.mesh), rel=1e-2)
+    assert "part of a body of revolution" in "".join(half.notes)
+    # The outline runs over the pole, which is on no other boundary.
+    (loop,) = half.mesh.boundary_loops
+    plane = half.mesh.vertices[loop]
+    assert np.minimum(np.abs(plane[:, 1]), np.abs(plane[:, 2])).max() < 0.01
 
 
 def test_openings_are_cut_out_of_rings():
