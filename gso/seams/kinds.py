@@ -15,7 +15,7 @@ from gso.mesh.attributes import LABELS
 from gso.mesh.slicing import sliced
 from gso.mesh.topology import edge_graph
 from gso.spelling import choices
-from gso.typing import Array, Ints
+from gso.typing import Array, Flags, Ints
 
 #: Price of edges in the plane of a slice, relative to those at a distance of one edge length.
 _NEAR = 0.3
@@ -221,7 +221,7 @@ class Creases(Seam):
         return np.stack([he.origin[k], he.dest[k]], axis=1)
 
 
-def edges_between(mesh: Mesh, label: Ints) -> Ints:
+def edges_between(mesh: Mesh, label: Ints | Flags) -> Ints:
     """Return the edges (e, 2) between faces with different labels (m,)."""
     he, k = mesh.half_edges, mesh.half_edges.interior
     k = k[label[he.face[k]] != label[he.face[he.twin[k]]]]

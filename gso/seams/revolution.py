@@ -80,14 +80,7 @@ class Revolution:
         >>> abs(found.axis).round(3).tolist(), sorted(found.profile[:, 0].round(1).tolist())
         ([0.0, 0.0, 1.0], [1.0, 3.0])
         """
-        triangles = Mesh(mesh.vertices, mesh.triangles)
-        if not len(triangles.faces) or len(np.unique(triangles.components)) > 1:
-            return None
-        for origin, axis in _axes(triangles):
-            found = Sections(triangles, origin, axis).profile(distance)
-            if found is not None:
-                return cls(origin, axis, *found)
-        return None
+        return cls._found(mesh, distance, part=False)
 
     @classmethod
     def with_part(cls, mesh: Mesh, distance: float) -> Revolution | None:
@@ -101,11 +94,16 @@ class Revolution:
         mesh, distance
             As of :meth:`of`; its boundary may be any.
         """
+        return cls._found(mesh, distance, part=True)
+
+    @classmethod
+    def _found(cls, mesh: Mesh, distance: float, *, part: bool) -> Revolution | None:
         triangles = Mesh(mesh.vertices, mesh.triangles)
         if not len(triangles.faces) or len(np.unique(triangles.components)) > 1:
             return None
-        for origin, axis in _axes(triangles, part=True):
-            found = Sections(triangles, origin, axis).part_profile(distance)
+        for origin, axis in _axes(triangles, part=part):
+            sections = Sections(triangles, origin, axis)
+            found = (sections.part_profile if part else sections.profile)(distance)
             if found is not None:
                 return cls(origin, axis, *found)
         return None
@@ -140,7 +138,7 @@ class Revolution:
         return float(np.linalg.norm(away - share[:, None] * way, axis=1).max())
 
 
-def _axes(mesh: Mesh, *, part: bool = False) -> list[tuple[Array, Array]]:
+def _axes(mesh: Mesh, *, part: bool) -> list[tuple[Array, Array]]:
     """Return axes to try, of the body that a mesh is or is a part of: points and directions.
 
     The best come first.

@@ -66,8 +66,9 @@ def rolled(
         What was measured of them.
     settings : FabricationSettings
     """
-    # This imports SciPy.
+    # These import SciPy.
     from gso.ruled.paneling.ring_strips import REVOLUTION
+    from gso.seams.kinds import edges_between
 
     surface = result.ruled
     if surface is None or result.details.get("rulings_from") != REVOLUTION or len(given.kept):
@@ -75,11 +76,9 @@ def rolled(
     points, faces = surface.mesh.vertices, surface.mesh.faces
     triangles, owner = divided([face[face >= 0] for face in faces], points)
     mesh = Mesh(points, triangles)
-    part, he = surface.strip[owner], mesh.half_edges
-    inner = he.interior
-    joint = inner[part[he.face[inner]] != part[he.face[he.twin[inner]]]]
-    between = np.stack([he.origin[joint], he.dest[joint]], axis=1)
-    found = _folded(replace(given, kept=between), mesh, settings, parts=part)
+    part = surface.strip[owner]
+    apart = replace(given, kept=edges_between(mesh, part))
+    found = _folded(apart, mesh, settings, parts=part)
     if found is None or found.parts != surface.strips:
         return None
     far = record["deviation_max"] + found.recognised.chord

@@ -66,7 +66,7 @@ def of_pattern(
     }
 
 
-def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
+def _judged(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
     """Return why panels are not what was asked for, beside the reasons of their solve."""
     record, names = made.record, [panel.name for panel in made.panels]
     sheets = [Sheet(panel.surface, panel.flat) for panel in made.panels]
@@ -111,7 +111,7 @@ def judge(made: Made, settings: FabricationSettings) -> tuple[Reason, ...]:
 
 def checked(made: Made, settings: FabricationSettings) -> Made:
     """Add the reasons against the panels."""
-    return replace(made, reasons=judge(made, settings))
+    return replace(made, reasons=_judged(made, settings))
 
 
 def bent(made: Made) -> Made:

@@ -13,6 +13,7 @@ from gso.exact import developable_parts
 from gso.mesh import Mesh
 from gso.mesh.cut import cut
 from gso.mesh.topology import edge_keys, pair_keys
+from gso.seams.kinds import edges_between
 from gso.seams.seam_request import faces_within
 from gso.typing import Ints, Json
 from gso.verdict import compare
@@ -52,9 +53,7 @@ def mixed(given: Design, settings: FabricationSettings, keep: _Make, change: _Ma
     kept = developable_parts(mesh, settings.strain)
     if not kept.any() or kept.all():
         return None
-    he = mesh.half_edges
-    border = he.interior[kept[he.face[he.interior]] != kept[he.face[he.twin[he.interior]]]]
-    pieces = Pieces(mesh, cut(mesh, np.stack([he.origin[border], he.dest[border]], axis=1)))
+    pieces = Pieces(mesh, cut(mesh, edges_between(mesh, kept)))
     if len(pieces) > _MANY:
         return None
     own = replace(settings, max_deviation=settings.distance(mesh.diagonal))

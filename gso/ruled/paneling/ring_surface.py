@@ -58,14 +58,14 @@ class RingSurface:
         count = int(np.ceil(np.pi / np.sqrt(2.0 * ROUND * allowed / float(polygon[:, 0].max()))))
         self.count = int(np.clip(count, *_FACETS))
         self.ways = directions(design, body.origin, body.axis)
-        self.is_closed = bool(np.array_equal(polygon[0], polygon[-1]))
+        self.is_closed = body.is_closed
         along = arc_lengths(polygon)
         self.size = float(along[-1])
         self.levels = along / self.size
 
     def whole(self) -> RuledSurface:
         """Return the whole surface."""
-        rows, count = len(self.polygon) - 1, self.count
+        rows, count = self._rows, self.count
         points = self._at(np.arange(1.0 * count), np.arange(rows + 1.0)[:, None]).reshape(-1, 3)
         ids = np.arange((rows + 1) * count).reshape(rows + 1, count)
         on_axis = self.polygon[:, 0] == 0.0
