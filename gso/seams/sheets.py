@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gso import faults, metrics
+from gso.geometry.flat_region import region
 from gso.geometry.polygon import mean_width, rectangle
 from gso.mesh import Mesh, Paths
 from gso.pattern import Folded
@@ -16,6 +18,9 @@ from gso.pipeline import lay_out
 from gso.short_repr import short_repr
 from gso.typing import Array, Ints
 from gso.verdict import Code, Measurement
+
+if TYPE_CHECKING:
+    from shapely import Geometry
 
 #: Smallest share of a piece's area on both sides of a neck.
 _SHARE = 0.02
@@ -81,6 +86,13 @@ class Sheet:
         return loops[int(np.argmax(size))]
 
     @cached_property
+    def region(self) -> Geometry:
+        """The region of the pattern."""
+        outline = self.outline
+        holes = [loop for loop in self.mesh.boundary_loops if loop is not outline]
+        return region(self.flat[outline], [self.flat[loop] for loop in holes])
+
+    @cached_property
     def size(self) -> tuple[float, float]:
         """Length and width of the smallest bounding rectangle."""
         return rectangle(self.flat)[1]
@@ -130,6 +142,11 @@ def too_small(
         Code.SMALL: Measurement(areas / area, place, names),
         Code.NARROW: Measurement(widths / size, place, names),
     }
+
+
+def least_neck(size: float) -> float:
+    """Return the width that a part that is joined to others has everywhere, of a design's size."""
+    return (Code.NARROW.info.limit or 0.0) * size
 
 
 def laid(mesh: Mesh, formulation: str = "strain") -> Sheet | None:

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from gso import metrics
+from gso.geometry.flat_region import neck, region
+from gso.seams.sheets import least_neck
 from gso.typing import Array
 from gso.verdict import Code, Measurement, Reason, compare, ordered
 from gso.workshop.fabrication_settings import FabricationSettings
@@ -14,7 +16,6 @@ from gso.workshop.finish import Finish
 from gso.workshop.measurements import bend_radius
 from gso.workshop.panels import Panel
 from gso.workshop.parts import Fitted
-from gso.workshop.polygons import neck, region
 from gso.workshop.thickness import Thickness
 
 #: Largest difference of the two sides of a seam that the thickness may add, in sheet thicknesses.
@@ -54,7 +55,7 @@ def _necks(own: Fitted, kerf: float) -> tuple[Reason, ...]:
     """Return why parts are too narrow: less than the kerf or, with seams, a share of the size."""
     pairs = [(seam.one.panel, seam.two.panel) for seam in own.made.matings]
     joined = {k for one, two in pairs if one != two for k in (one, two)}
-    share = (Code.NARROW.info.limit or 0.0) * own.made.record["size"] * own.scale
+    share = least_neck(own.made.record["size"] * own.scale)
     rows = []
     for number, panel in enumerate(own.panels):
         least = max(kerf, share if number in joined else 0.0)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gso.errors import OptionError
+from gso.geometry.flat_region import region
 from gso.geometry.polygon import anticlockwise, densified
 from gso.mesh import Mesh
 from gso.mesh.closest_point import Nearest
@@ -17,7 +18,6 @@ from gso.metrics import point_to_surface
 from gso.typing import Array, Ints
 from gso.verdict import Code, Measurement, Reason, compare
 from gso.workshop.panels import Panel
-from gso.workshop.polygons import region
 
 #: Number of points of a mark along the diagonal of a panel, at least, before those are left out
 #: from which the line is less than a share of its size away.

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.geometry.flat_region import region
 from gso.geometry.polygon import rectangle
 from gso.typing import Array
 from gso.workshop.part import Part
-from gso.workshop.polygons import region, roomiest, without
+from gso.workshop.polygons import roomiest, without
 
 if TYPE_CHECKING:
     from shapely import Geometry

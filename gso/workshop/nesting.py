@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from gso.errors import OptionError
+from gso.geometry.flat_region import moved
 from gso.geometry.polygon import anticlockwise, signed_area
 from gso.geometry.steady import steady
 from gso.quantities import as_positive
@@ -16,7 +17,6 @@ from gso.typing import Array
 from gso.wording import logged
 from gso.workshop import sparrow
 from gso.workshop.part import Drawing, Part
-from gso.workshop.polygons import moved
 from gso.workshop.rectangles import ORDERS, packed
 
 #: Largest number of corners of the polygons that are nested.

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from gso.errors import MeshError
+from gso.geometry.flat_region import moved, region
 from gso.typing import Array
 from gso.workshop.part import Part
-from gso.workshop.polygons import moved, region, rings
+from gso.workshop.polygons import rings
 
 #: Largest length of a mitred corner, in widths of the offset.
 _MITRE = 3.0

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gso.geometry.flat_region import moved, region
 from gso.geometry.polygon import anticlockwise, arc_lengths, points_at, rectangle
 from gso.pattern import Bend
 from gso.typing import Array
@@ -18,7 +19,7 @@ from gso.workshop.name_places import name_place
 from gso.workshop.offsets import offset, with_allowance
 from gso.workshop.panels import Made, Mating, Panel, Side
 from gso.workshop.part import Label, Notch, Part
-from gso.workshop.polygons import moved, region, roomiest
+from gso.workshop.polygons import roomiest
 from gso.workshop.seam_strips import with_strips
 from gso.workshop.tabs import TabSeam, with_tabs
 from gso.workshop.thickness import thickened

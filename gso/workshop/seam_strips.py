@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.geometry.flat_region import largest, region
 from gso.geometry.vectors import unit
 from gso.pattern import Bend
 from gso.typing import Array, Flags
 from gso.workshop.panels import Mating
 from gso.workshop.part import Part
-from gso.workshop.polygons import common, largest, region, rings, united, without
+from gso.workshop.polygons import common, rings, united, without
 from gso.workshop.tabs import TabSeam, beside, divided, face_angles, room
 from gso.workshop.thickness import Thickness
 

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso.geometry.flat_region import region
 from gso.geometry.polygon import arc_lengths, points_at
 from gso.geometry.steady import steady
 from gso.pattern import Bend
 from gso.typing import Array
 from gso.workshop.part import Label, Part
-from gso.workshop.polygons import common, region, rings, united, without
+from gso.workshop.polygons import common, rings, united, without
 
 if TYPE_CHECKING:
     from shapely import Geometry

@@ -13,9 +13,18 @@ from typing import TYPE_CHECKING
 from gso.first_use import at_first_use
 
 if TYPE_CHECKING:
+    from gso.ruled.paneling.cut_out import without_holes
+    from gso.ruled.paneling.hole_filling import filled, holes
     from gso.ruled.paneling.light_design import LightDesign
 
-__all__ = ["LightDesign"]
+__all__ = ["LightDesign", "filled", "holes", "without_holes"]
 
 # These import SciPy.
-__getattr__, __dir__ = at_first_use(__name__, {"light_design": "LightDesign"})
+__getattr__, __dir__ = at_first_use(
+    __name__,
+    {
+        "cut_out": "without_holes",
+        "hole_filling": "filled holes",
+        "light_design": "LightDesign",
+    },
+)

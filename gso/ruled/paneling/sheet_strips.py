@@ -9,13 +9,14 @@ import numpy as np
 
 from gso import metrics
 from gso.components import split
+from gso.geometry.flat_region import neck
 from gso.geometry.polygon import rectangle
 from gso.geometry.vectors import lengths
 from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.sheet_division import divided_to_fit
 from gso.seams import Sheet
-from gso.seams.sheets import too_small
+from gso.seams.sheets import least_neck, too_small
 from gso.status import Status
 from gso.typing import Array, Ints
 from gso.verdict import Code, Measurement, Reason, compare
@@ -46,7 +47,7 @@ def against_parts(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     return (*reasons, *request.seams.reasons(pieces, sheets))
 
 
-def against_slivers(result: StripsResult) -> tuple[Reason, ...]:
+def against_slivers(result: Result) -> tuple[Reason, ...]:
     """Return the reasons if parts that are joined to others are smaller than anybody would make."""
     design, pattern = result.design, result.pattern
     if pattern is None:
@@ -58,7 +59,10 @@ def against_slivers(result: StripsResult) -> tuple[Reason, ...]:
     sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in joined]
     if not sheets:
         return ()
-    return compare(too_small(sheets, metrics.area(design), design.size, "part"), {})
+    least = least_neck(design.size)
+    necks = np.array([neck(sheet.region, least) for sheet in sheets])
+    measured = too_small(sheets, metrics.area(design), design.size, "part")
+    return compare(measured | {Code.NECK: Measurement(necks, "part")}, {Code.NECK: least})
 
 
 def _against_pleats(result: Result, request: StripsRequest) -> tuple[Reason, ...]:

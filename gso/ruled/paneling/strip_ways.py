@@ -19,6 +19,7 @@ from gso.recognition import fold_triangles
 from gso.result import Result, StripsResult
 from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.exact_strips import exact_strips
+from gso.ruled.paneling.filled_strips import filled_strips
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import Options
 from gso.ruled.paneling.piece_strips import found_pieces, of_found, of_pieces
@@ -115,10 +116,9 @@ class StripsTask:
             return self._answer(tried)
         light = LightDesign.of(self.design, asked.max_deviation, named=asked.names_vertices)
         if self.whole:
-            for way in self._ways():
-                tried += way(light, tried)
-                if tried and tried[-1].ended:
-                    return self._answer(tried)
+            tried += self._ways_tried(light, tried)
+            if tried and tried[-1].ended:
+                return self._answer(tried)
             lines = self._lines
             if not tried and lines is not None and lines.stopped:
                 return unsolved(self.design, self.request)
@@ -155,6 +155,15 @@ class StripsTask:
             raise failed
         return self._answer(tried)
 
+    def _ways_tried(self, light: LightDesign, before: Sequence[Tried] = ()) -> list[Tried]:
+        """Try the ways to make strips of the whole design, one after the other."""
+        found: list[Tried] = []
+        for way in self._ways():
+            found += way(light, [*before, *found])
+            if found and found[-1].ended:
+                break
+        return found
+
     def _ways(self) -> tuple[Callable[[LightDesign, Sequence[Tried]], list[Tried]], ...]:
         """Return the ways to make strips of the whole design, in order.
 
@@ -168,7 +177,7 @@ class StripsTask:
         else:
             others = self._as_a_whole, self._along_lines
         first = self._as_it_is, self._kept_smooth, self._in_rings, self._between_creases
-        return *first, *others
+        return *first, self._without_its_holes, *others
 
     @property
     def _many(self) -> bool:
@@ -294,8 +303,25 @@ class StripsTask:
             return []
         undivided = light.whole(made, asked)
         result = on_sheets(undivided, asked, [])
-        own = judge(result, asked.limits)
-        return [Tried(result, ordered([*own, *against_parts(result, asked)]), undivided)]
+        return [Tried(result, self._reasons(result, judge(result, asked.limits)), undivided)]
+
+    def _without_its_holes(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
+        """Return strips of the design without its holes, from which these are cut.
+
+        The lines of a design of quads go around its holes.
+        """
+        asked = self.request
+        free = self._counted and asked.options.lines and not asked.options.flats
+        if tried or not free or asked.names_vertices or not light.mesh.has_triangles:
+            return []
+
+        def ways(mesh: Mesh, request: StripsRequest) -> list[Tried]:
+            own = StripsTask(mesh, request, None, True, self.kept)
+            return own._ways_tried(LightDesign(mesh, mesh, request.max_deviation))
+
+        made = filled_strips(light, asked, ways)
+        found = [] if made is None else [self._judged(made)]
+        return [one for one in found if one.holds or one.ended]
 
     @cached_property
     def _exact(self) -> StripsResult | None:
@@ -320,11 +346,15 @@ class StripsTask:
         return min(best, own, key=lambda one: one.order(few=True))
 
     def _judged(self, result: StripsResult) -> Tried:
-        reasons = [*judge(result, self.request.limits), *against_parts(result, self.request)]
+        return Tried(result, self._reasons(result, judge(result, self.request.limits)))
+
+    def _reasons(self, result: Result, known: Sequence[Reason]) -> tuple[Reason, ...]:
+        """Return all reasons against a result, of which those of its verdict are known."""
+        reasons = [*known, *against_parts(result, self.request)]
         if self.divisible:
             # Other strips within the distance may be parts that can be made.
             reasons += against_slivers(result)
-        return Tried(result, ordered(reasons))
+        return ordered(reasons)
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request
@@ -358,7 +388,7 @@ class StripsTask:
         if asked.verdict or self.divisible:
             violation = violation_of(case_of(self.design, asked)) if asked.constraints else 0.0
             own = judge(result, asked.limits, violation)
-            reasons = ordered([*own, *against_parts(result, asked)])
+            reasons = self._reasons(result, own)
         result.seconds["verdict"] = time.perf_counter() - clock
         return [Tried(result, reasons, undivided)]
 
@@ -428,12 +458,12 @@ class StripsTask:
         undivided = result
         result = on_sheets(result, asked, [partial(narrow, k) for k in families])
         own = judge(result, asked.limits) if asked.verdict or self.divisible else ()
-        return [Tried(result, ordered([*own, *against_parts(result, asked)]), undivided)]
+        return [Tried(result, self._reasons(result, own), undivided)]
 
     def _judged_pieces(self, result: Result, reasons: tuple[Reason, ...]) -> Tried:
         """Divide strips of pieces for the sheet, and judge them."""
         result = divided(result, self.request)
-        return Tried(result, ordered([*reasons, *against_parts(result, self.request)]))
+        return Tried(result, self._reasons(result, reasons))
 
 
 def own_names(preferences: Sequence[str]) -> list[str]:

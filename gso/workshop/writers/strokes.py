@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gso.geometry.flat_region import region
 from gso.pattern import Bend, Zone
 from gso.typing import Array
 from gso.workshop.names import different
 from gso.workshop.part import Drawing, GuideLine, Label, Part
-from gso.workshop.polygons import common, region
+from gso.workshop.polygons import common
 
 # A bend by less is none, in radians.
 _FLAT = 1e-9

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gso.errors import OptionError
+from gso.geometry.flat_region import region
 from gso.typing import Array
 from gso.workshop.part import Drawing
-from gso.workshop.polygons import region
 
 #: Height of the strip below the window that has the title and the scale bar, in millimetres.
 FOOT = 12.0

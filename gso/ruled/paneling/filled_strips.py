@@ -1,0 +1,60 @@
+"""Strips of a design with holes: those of the surface without them, from which they are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from gso.mesh import Mesh
+from gso.metrics.hole_defects import turning
+from gso.result import StripsResult
+from gso.ruled.paneling.cut_out import without_holes
+from gso.ruled.paneling.hole_filling import filled, holes
+from gso.ruled.paneling.light_design import LightDesign
+from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.paneling.tried_strips import Tried
+
+#: Largest total curvature of a design, regardless of its sign. Strips around a hole of a dome,
+#: whose curvature is 2 pi, are better than those across it.
+_CURVED = 2.0
+
+#: Strips of a surface, in several ways.
+Ways = Callable[[Mesh, StripsRequest], list[Tried]]
+
+
+def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> StripsResult | None:
+    """Return strips of a design with holes, such as windows, without a verdict.
+
+    Parameters
+    ----------
+    light : LightDesign
+    request : StripsRequest
+    ways : callable
+        Makes strips of the design without its holes.
+
+    Returns
+    -------
+    StripsResult or None
+        None where the design has no holes, or its strips without them do not hold the limits, and
+        for domes.
+    """
+    mesh = light.mesh
+    # The theorem of Gauss and Bonnet.
+    curvature = 2.0 * np.pi * mesh.euler_characteristic - turning(mesh).sum()
+    whole = filled(mesh) if abs(curvature) < _CURVED else None
+    if whole is None:
+        return None
+    request.say("without its holes")
+    limits = replace(request.limits, max_deviation=light.allowed)
+    tried = [one for one in ways(whole, replace(request, limits=limits)) if one.holds]
+    for one in sorted(tried, key=lambda one: one.order(few=True)):
+        if isinstance(one.result, StripsResult) and one.result.pieces is None:
+            outlines = [light.design.vertices[loop] for loop in holes(light.design)]
+            surface = without_holes(one.result.ruled, light.design, outlines)
+            if surface is not None:
+                details = one.result.details | {"strips": surface.strips}
+                changed = StripsResult.attributes(surface)
+                return replace(one.result, design=light.design, details=details, **changed)
+    return None
