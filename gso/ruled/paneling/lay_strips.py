@@ -70,7 +70,8 @@ def strips(
     design is cut into pieces without darts, which become developable together, and are divided by
     rulings between shared points of their seams. Where that does not hold the limits, each piece
     becomes strips that follow it. With a sheet, strips that are too long are divided across, but
-    for those whose rulings branch. The result that holds the limits is returned, or else the closest.
+    for those whose rulings branch. The result that holds the limits is returned, or else the
+    closest.
 
     Parameters
     ----------
