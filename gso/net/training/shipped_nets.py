@@ -22,7 +22,7 @@ HOURS = {
     "net-f": 0.75,
     "flatten": 1.25,
     "denoise": 0.75,
-    "net-s": 0.75,
+    "net-s": 0.85,
     "flatten-w": 0.5,
 }
 #: Settings of a configuration that name another net.

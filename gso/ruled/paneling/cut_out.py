@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gso import metrics
 from gso.geometry.ears import divided
 from gso.geometry.plane import loop_axes
 from gso.geometry.polygon import signed_area
@@ -20,6 +21,7 @@ from gso.ruled.lines.polygons import Polygons
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.surface_polygons import SurfacePolygons
 from gso.typing import Array, Flags, Ints
+from gso.verdict import Code
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -40,7 +42,8 @@ def without_holes(
     """Cut holes out of a surface.
 
     The outline of each hole is moved to the nearest points of the surface. It is cut out of the
-    polygons as they are seen along the normal of its plane.
+    polygons as they are seen along the normal of its plane. Parts of strips between a hole and
+    another strip that are too small to be made are left out.
 
     Parameters
     ----------
@@ -63,6 +66,7 @@ def without_holes(
     cut = _Cut(surface.mesh.vertices, [vertex[ring] for ring in read.rings])
     if not all(cut.out(loop) for loop in holes):
         return None
+    cut.leave_out(read.pairs, (Code.SMALL.info.limit or 0.0) * metrics.area(design))
     none = np.empty((0, 3), np.int64)
     polygons = Polygons(
         cut.rings,
@@ -138,12 +142,30 @@ class _Cut:
         pairs : ndarray of int, (r, 2)
             Polygons of the surface on both sides of rulings.
         """
+        return self._hinges(pairs)[2]
+
+    def leave_out(self, pairs: Ints, least: float) -> None:
+        """Leave out the parts of strips that were cut off and have less than an area."""
+        one, two, _ = self._hinges(pairs)
+        label = topology.label_components(len(self.rings), one, two)
+        corners = [self.points[ring] - self.points[ring[0]] for ring in self.rings]
+        area = [np.linalg.norm(cross(p, np.roll(p, -1, axis=0)).sum(axis=0)) for p in corners]
+        small = np.bincount(label, 0.5 * np.array(area)) < least
+        strip = topology.label_components(int(self.origin.max()) + 1, *pairs.T)[self.origin]
+        # What is left of a strip has other parts.
+        parts = np.unique(np.stack([strip, label], axis=1), axis=0)[:, 0]
+        kept = ~small[label] | (np.bincount(parts)[strip] == 1)
+        self.rings = [ring for ring, keep in zip(self.rings, kept, strict=True) if keep]
+        self.origin = self.origin[kept]
+
+    def _hinges(self, pairs: Ints) -> tuple[Ints, Ints, Ints]:
+        """Return polygons (k,), (k,) that rulings join, and these (k, 2); see :meth:`rulings`."""
         one, two, edges = self._inner()
         both = np.sort(np.stack([self.origin[one], self.origin[two]], axis=1), axis=1)
         count = int(self.origin.max()) + 1
         known = np.isin(topology.pair_keys(both, count), topology.pair_keys(pairs, count))
-        out: Ints = edges[known | (both[:, 0] == both[:, 1])]
-        return out
+        joined = known | (both[:, 0] == both[:, 1])
+        return one[joined], two[joined], edges[joined]
 
     def _sides(self) -> tuple[Ints, Ints]:
         """Return the sides (s, 2) of all polygons, and the polygon of each."""

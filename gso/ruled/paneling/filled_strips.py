@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -24,8 +24,8 @@ _CURVED = 2.0
 Ways = Callable[[Mesh, StripsRequest], list[Tried]]
 
 
-def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> StripsResult | None:
-    """Return strips of a design with holes, such as windows, without a verdict.
+def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Iterator[StripsResult]:
+    """Make strips of a design with holes, such as windows, without a verdict.
 
     Parameters
     ----------
@@ -34,27 +34,26 @@ def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Str
     ways : callable
         Makes strips of the design without its holes.
 
-    Returns
-    -------
-    StripsResult or None
-        None where the design has no holes, or its strips without them do not hold the limits, and
-        for domes.
+    Yields
+    ------
+    StripsResult
+        Those that hold the limits before the holes are cut out, the fewest first. There are none
+        of designs without holes, and of domes.
     """
     mesh = light.mesh
     # The theorem of Gauss and Bonnet.
     curvature = 2.0 * np.pi * mesh.euler_characteristic - turning(mesh).sum()
     whole = filled(mesh) if abs(curvature) < _CURVED else None
     if whole is None:
-        return None
+        return
     request.say("without its holes")
     limits = replace(request.limits, max_deviation=light.allowed)
     tried = [one for one in ways(whole, replace(request, limits=limits)) if one.holds]
+    outlines = [light.design.vertices[loop] for loop in holes(light.design)]
     for one in sorted(tried, key=lambda one: one.order(few=True)):
         if isinstance(one.result, StripsResult) and one.result.pieces is None:
-            outlines = [light.design.vertices[loop] for loop in holes(light.design)]
             surface = without_holes(one.result.ruled, light.design, outlines)
             if surface is not None:
                 details = one.result.details | {"strips": surface.strips}
                 changed = StripsResult.attributes(surface)
-                return replace(one.result, design=light.design, details=details, **changed)
-    return None
+                yield replace(one.result, design=light.design, details=details, **changed)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import islice
 
 import numpy as np
 
@@ -306,22 +307,18 @@ class StripsTask:
         return [Tried(result, self._reasons(result, judge(result, asked.limits)), undivided)]
 
     def _without_its_holes(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
-        """Return strips of the design without its holes, from which these are cut.
-
-        The lines of a design of quads go around its holes.
-        """
+        """Return strips of the design without its holes, from which these are cut."""
         asked = self.request
         free = self._counted and asked.options.lines and not asked.options.flats
-        if tried or not free or asked.names_vertices or not light.mesh.has_triangles:
+        if tried or not free or asked.names_vertices:
             return []
 
         def ways(mesh: Mesh, request: StripsRequest) -> list[Tried]:
             own = StripsTask(mesh, request, None, True, self.kept)
             return own._ways_tried(LightDesign(mesh, mesh, request.max_deviation))
 
-        made = filled_strips(light, asked, ways)
-        found = [] if made is None else [self._judged(made)]
-        return [one for one in found if one.holds or one.ended]
+        found = map(self._judged, filled_strips(light, asked, ways))
+        return list(islice((one for one in found if one.holds or one.ended), 1))
 
     @cached_property
     def _exact(self) -> StripsResult | None:
