@@ -400,8 +400,8 @@ class TestParts:
 
 class TestMaking:
     def test_a_strongly_curved_design_is_cut_into_pieces(self):
-        # Triangles with two holes, over which there are no grids whose lines strips could follow, and
-        # so curved that holes are not filled.
+        # Triangles with two holes, over which there are no grids whose lines strips could follow,
+        # and so curved that holes are not filled.
         grid = dome(11, height=1.5)
         kept = np.ones(len(grid.faces), bool)
         kept[[22, 77]] = False
