@@ -51,9 +51,14 @@ def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Ite
     tried = [one for one in ways(whole, replace(request, limits=limits)) if one.holds]
     outlines = [light.design.vertices[loop] for loop in holes(light.design)]
     for one in sorted(tried, key=lambda one: one.order(few=True)):
-        if isinstance(one.result, StripsResult) and one.result.pieces is None:
+        if isinstance(one.result, StripsResult) and _is_one(one.result):
             surface = without_holes(one.result.ruled, light.design, outlines)
             if surface is not None:
                 details = one.result.details | {"strips": surface.strips}
-                changed = StripsResult.attributes(surface)
+                changed = {"pieces": None, **StripsResult.attributes(surface)}
                 yield replace(one.result, design=light.design, details=details, **changed)
+
+
+def _is_one(result: StripsResult) -> bool:
+    """Tell whether strips are joined along all seams, and every piece has some."""
+    return not (result.ruled.mesh.components.any() or np.equal(result.details["strips"], 0).any())
