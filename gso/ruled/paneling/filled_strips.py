@@ -16,8 +16,8 @@ from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.paneling.tried_strips import Tried
 
-#: Largest total curvature of a design, regardless of its sign. Strips around a hole of a dome,
-#: whose curvature is 2 pi, are better than those across it.
+#: Total curvature of a design from which on it is a dome. Strips around a hole of a dome are better
+#: than those across it.
 _CURVED = 2.0
 
 #: Strips of a surface, in several ways.
@@ -40,11 +40,8 @@ def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Ite
         Those that hold the limits before the holes are cut out, the fewest first. There are none
         of designs without holes, and of domes.
     """
-    mesh = light.mesh
-    # The theorem of Gauss and Bonnet.
-    curvature = 2.0 * np.pi * mesh.euler_characteristic - turning(mesh).sum()
-    whole = filled(mesh) if abs(curvature) < _CURVED else None
-    if whole is None:
+    whole = filled(light.mesh)
+    if whole is None or (len(whole.boundary_loops) == 1 and _curvature(whole) > _CURVED):
         return
     request.say("without its holes")
     limits = replace(request.limits, max_deviation=light.allowed)
@@ -62,3 +59,8 @@ def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Ite
 def _is_one(result: StripsResult) -> bool:
     """Tell whether strips are joined along all seams, and every piece has some."""
     return not (result.ruled.mesh.components.any() or np.equal(result.details["strips"], 0).any())
+
+
+def _curvature(mesh: Mesh) -> float:
+    """Return the total curvature of a surface, by the theorem of Gauss and Bonnet."""
+    return float(2.0 * np.pi * mesh.euler_characteristic - turning(mesh).sum())
