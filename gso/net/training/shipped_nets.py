@@ -19,7 +19,7 @@ HOURS = {
     "developable": 3.0,
     "flatten-strain": 1.25,
     "net-c": 2.35,
-    "net-f": 0.75,
+    "net-f": 0.85,
     "flatten": 1.25,
     "denoise": 0.75,
     "net-s": 0.85,
