@@ -10,6 +10,7 @@ import numpy as np
 
 from gso import metrics
 from gso.geometry.ears import divided
+from gso.geometry.flat_region import region
 from gso.geometry.plane import loop_axes
 from gso.geometry.polygon import signed_area
 from gso.geometry.steady import steady
@@ -109,12 +110,10 @@ class _Cut:
         triangle, _, moved = self._nearest.locate(loop)
         axes = loop_axes(moved)
         flat = self.points @ axes[:2].T
-        hole = shapely.Polygon(moved @ axes[:2].T)
+        hole = region(moved @ axes[:2].T)
         owner = np.repeat(np.arange(len(self.rings)), [len(ring) for ring in self.rings])
         corners = flat[np.concatenate(self.rings)]
         shapes = shapely.polygons(shapely.linearrings(corners, indices=owner))
-        if not hole.is_valid:
-            return False
         at_rim = np.isin(self.origin, self._owner[triangle])
         reached = self._joined(shapely.intersects(shapes, hole), at_rim)
         normals = _normals([self.points[self.rings[k]] for k in reached])
@@ -226,7 +225,8 @@ class _Cut:
         self.points = np.concatenate([self.points, above + height[:, None] * axes[2]])
         kept = np.setdiff1d(np.arange(len(self.rings)), reached)
         ends = np.cumsum([len(piece) for piece in pieces])[:-1]
-        rings = [ring[ring != np.roll(ring, 1)] for ring in np.split(number, ends)]
+        rings = np.split(number, ends)[: len(pieces)]
+        rings = [ring[ring != np.roll(ring, 1)] for ring in rings]
         self.rings = [*(self.rings[k] for k in kept), *rings]
         self.origin = np.concatenate([self.origin[kept], self.origin[reached][of_piece]])
         self._insert(np.arange(count, len(self.points)))
