@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 import gso
 from gso import metrics
@@ -122,3 +123,19 @@ def test_windows_do_not_make_strips_more():
     assert one.deviation <= bound
     # Distances count from the design with its holes.
     assert one.ruled.distances(design).largest == pytest.approx(one.deviation, rel=1e-6)
+
+
+def test_a_dome_with_bolt_holes_becomes_rings():
+    ball = gso.as_mesh(trimesh.creation.icosphere(4))
+    middle = ball.vertices[ball.triangles].mean(axis=1)
+    keep = middle[:, 2] > 0.3
+    for turn in (0.4, 2.3, 4.5):
+        bolt = np.array([0.6 * np.cos(turn), 0.6 * np.sin(turn), 0.8])
+        keep &= np.linalg.norm(middle - bolt, axis=1) > 0.06
+    used, number = np.unique(ball.triangles[keep], return_inverse=True)
+    dome = Mesh(ball.vertices[used], number.reshape(-1, 3))
+    assert len(holes(dome)) == 3
+    made = gso.strips(dome, max_deviation="1%")
+    assert made.usable, made
+    assert made.ruled.strips <= 3
+    assert len(made.mesh.boundary_loops) == 4

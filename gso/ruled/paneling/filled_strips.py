@@ -20,8 +20,8 @@ from gso.ruled.paneling.tried_strips import Tried
 #: than those across it.
 _CURVED = 2.0
 
-#: Strips of a surface, in several ways.
-Ways = Callable[[Mesh, StripsRequest], list[Tried]]
+#: Strips of a surface: in several ways, or only rings about an axis.
+Ways = Callable[[Mesh, StripsRequest, bool], list[Tried]]
 
 
 def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Iterator[StripsResult]:
@@ -32,20 +32,21 @@ def filled_strips(light: LightDesign, request: StripsRequest, ways: Ways) -> Ite
     light : LightDesign
     request : StripsRequest
     ways : callable
-        Makes strips of the design without its holes.
+        Makes strips of the design without its holes; of a dome only rings.
 
     Yields
     ------
     StripsResult
         Those that hold the limits before the holes are cut out, the fewest first. There are none
-        of designs without holes, and of domes.
+        of designs without holes.
     """
     whole = filled(light.mesh)
-    if whole is None or (len(whole.boundary_loops) == 1 and _curvature(whole) > _CURVED):
+    if whole is None:
         return
+    domed = len(whole.boundary_loops) == 1 and _curvature(whole) > _CURVED
     request.say("without its holes")
     limits = replace(request.limits, max_deviation=light.allowed)
-    tried = [one for one in ways(whole, replace(request, limits=limits)) if one.holds]
+    tried = [one for one in ways(whole, replace(request, limits=limits), domed) if one.holds]
     outlines = [light.design.vertices[loop] for loop in holes(light.design)]
     for one in sorted(tried, key=lambda one: one.order(few=True)):
         if isinstance(one.result, StripsResult) and _is_one(one.result):

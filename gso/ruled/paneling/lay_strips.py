@@ -66,12 +66,11 @@ def strips(
     Otherwise the design is tried as one surface, with as few strips side by side as hold
     `max_deviation`. Strips along lines are tried, too, which may close around: the lines of a quad
     mesh, or of a grid laid over a disk or a tube. Windows and other holes are cut out of strips of
-    the design without them, unless it is a mesh of quads or a dome. Where neither holds it, the
-    design is cut into pieces without darts, which become developable together, and are divided by
-    rulings between shared points of their seams. Where that does not hold the limits, each piece
-    becomes strips that follow it. With a sheet, strips that are too long are divided across, but
-    for those whose rulings branch. The result that holds the limits is returned, or else the
-    closest.
+    the design without them, and of a dome out of rings. Where neither holds it, the design is cut
+    into pieces without darts, which become developable together, and are divided by rulings
+    between shared points of their seams. Where that does not hold the limits, each piece becomes
+    strips that follow it. With a sheet, strips that are too long are divided across, but for those
+    whose rulings branch. The result that holds the limits is returned, or else the closest.
 
     Parameters
     ----------

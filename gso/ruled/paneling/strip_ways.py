@@ -310,12 +310,13 @@ class StripsTask:
         """Return strips of the design without its holes, from which these are cut."""
         asked = self.request
         free = self._counted and asked.options.lines and not asked.options.flats
-        if tried or not free or asked.names_vertices:
+        if any(one.holds for one in tried) or not free or asked.names_vertices:
             return []
 
-        def ways(mesh: Mesh, request: StripsRequest) -> list[Tried]:
+        def ways(mesh: Mesh, request: StripsRequest, domed: bool) -> list[Tried]:
             own = StripsTask(mesh, request, None, True, self.kept)
-            return own._ways_tried(LightDesign(mesh, mesh, request.max_deviation))
+            whole = LightDesign(mesh, mesh, request.max_deviation)
+            return own._in_rings(whole, ()) if domed else own._ways_tried(whole)
 
         found = map(self._judged, filled_strips(light, asked, ways))
         return list(islice((one for one in found if one.holds or one.ended), 1))
