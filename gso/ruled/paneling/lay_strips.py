@@ -17,9 +17,10 @@ from gso.pipeline.judgement import warning
 from gso.quantities import Length, Strain, as_length, as_sheet, as_strain
 from gso.result import Result
 from gso.ruled.paneling.along import Along
+from gso.ruled.paneling.given_design import design_of
 from gso.ruled.paneling.options import MOST, Options
-from gso.ruled.paneling.strip_ways import StripsTask, design_of, own_names
-from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.paneling.strip_ways import StripsTask
+from gso.ruled.paneling.strips_request import StripsRequest, own_names
 from gso.seams.edge_prices import Avoid, Follow, edges_to_follow, faces_to_avoid
 from gso.seams.seam_request import SeamRequest
 from gso.solver import Callback

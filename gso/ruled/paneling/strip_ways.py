@@ -13,7 +13,6 @@ import numpy as np
 from gso.cut_pieces import Pieces
 from gso.errors import GSOError, MeshError
 from gso.exact import keeps_rows
-from gso.io import as_mesh
 from gso.mesh import Mesh
 from gso.pipeline.judgement import add_reasons, violation_of
 from gso.recognition import fold_triangles
@@ -21,6 +20,7 @@ from gso.result import Result, StripsResult
 from gso.ruled.lines import LineStrips
 from gso.ruled.paneling.exact_strips import exact_strips
 from gso.ruled.paneling.filled_strips import filled_strips
+from gso.ruled.paneling.given_design import design_of, without_darts
 from gso.ruled.paneling.light_design import LightDesign
 from gso.ruled.paneling.options import Options
 from gso.ruled.paneling.piece_strips import found_pieces, of_found, of_pieces
@@ -34,14 +34,16 @@ from gso.ruled.paneling.sheet_strips import (
     on_sheets,
 )
 from gso.ruled.paneling.shop_notes import shop_notes
-from gso.ruled.paneling.strips_request import StripsRequest
+from gso.ruled.paneling.strips_request import StripsRequest, own_names
 from gso.ruled.paneling.surface_strips import (
     along_lines,
     case_of,
     check_connected,
     check_whole,
+    is_whole,
     lines_of,
     of_surface,
+    unaligned,
     unsolved,
 )
 from gso.ruled.paneling.tried_strips import FOLDED, Tried
@@ -97,8 +99,8 @@ class StripsTask:
             # Its pieces were found, and the whole is better if it holds the limit.
             named = request.options.number is not None or len(given.kept) > 0
             fixed = named or request.max_deviation is None
-            given = _without_darts(given)
-        if len(given) == 1 and _is_whole(design):
+            given = without_darts(given)
+        if len(given) == 1 and is_whole(design):
             return cls(design, request, None, True, kept)
         return cls(design, request, given, not fixed, kept)
 
@@ -124,7 +126,7 @@ class StripsTask:
             if not tried and lines is not None and lines.stopped:
                 return unsolved(self.design, self.request)
             if not tried and self.request.along is not None:
-                raise MeshError(_unaligned(lines, self.request.options.number))
+                raise MeshError(unaligned(lines, self.request.options.number))
             if not (tried or self.divisible):
                 least, number = self._least, asked.options.number
                 if number is not None and 1 < number < least:
@@ -247,7 +249,7 @@ class StripsTask:
         if result is None:
             return []
         folded = bool((result.ruled.rulings.radii == 0).any())
-        if not (self.request.max_deviation or (folded and _is_whole(self.design))):
+        if not (self.request.max_deviation or (folded and is_whole(self.design))):
             return []
         return [self._judged(result)]
 
@@ -258,7 +260,7 @@ class StripsTask:
         these: only strips between rulings have a smooth surface for CAD.
         """
         result = self._exact if self.request.options.lines else None
-        if tried or result is None or not _is_whole(self.design):
+        if tried or result is None or not is_whole(self.design):
             return []
         return [self._judged(result)]
 
@@ -270,7 +272,7 @@ class StripsTask:
         asked = self.request
         if tried or not asked.may_be_cut or asked.seams.preferences:
             return []
-        if self._lines is None and not _is_whole(light.mesh):
+        if self._lines is None and not is_whole(light.mesh):
             return []
         mesh, triangles = light.mesh, fold_triangles(light.mesh)
         if not np.array_equal(triangles, mesh.triangles):
@@ -356,7 +358,7 @@ class StripsTask:
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request
-        if any(self._is_enough(one) for one in tried) or not _is_whole(light.mesh):
+        if any(self._is_enough(one) for one in tried) or not is_whole(light.mesh):
             return []
         held = [one.fewer for one in tried if self._counted and one.holds]
         most = min([asked.options.max_strips, *held])
@@ -462,46 +464,3 @@ class StripsTask:
         """Divide strips of pieces for the sheet, and judge them."""
         result = divided(result, self.request)
         return Tried(result, self._reasons(result, reasons))
-
-
-def own_names(preferences: Sequence[str]) -> list[str]:
-    """Return the names that preferences of the search for pieces have here."""
-    return ["seams_along" if name == "along" else name for name in preferences]
-
-
-def _unaligned(lines: LineStrips | None, number: int | None) -> str:
-    """Return why no strips run along a direction."""
-    if lines is not None and number is not None and not lines.least <= number <= lines.most:
-        return (
-            f"{number} strips are too {'few' if number < lines.least else 'many'} along the given "
-            f"direction; ask for {lines.least} to {lines.most}"
-        )
-    return (
-        "no strips run along the given direction: this takes one component of quads, or a disk or "
-        "a tube; leave `along` out"
-    )
-
-
-def design_of(given: MeshLike | Pieces) -> Mesh:
-    """Return the design from which distances count."""
-    if isinstance(given, Segmentation) and given.given is not None:
-        return given.given
-    return given.design if isinstance(given, Pieces) else as_mesh(given)
-
-
-def _is_whole(mesh: Mesh) -> bool:
-    """Tell whether a mesh is one surface that can be made of strips."""
-    try:
-        check_whole(mesh)
-    except MeshError:
-        return False
-    return True
-
-
-def _without_darts(found: Segmentation) -> Pieces:
-    """Return pieces of the design as it was given, without darts where that leaves disks."""
-    design, sides = found.unchanged, found.sides
-    pieces = cut(design, Edges(found.edges[sides[:, 0] != sides[:, 1]]))
-    # A seam within a piece may open a ring or a handle.
-    whole = len(pieces) == 1 or all(piece.is_disk for piece in pieces)
-    return pieces if whole else cut(design, Edges(found.edges))

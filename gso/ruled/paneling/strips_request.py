@@ -119,3 +119,8 @@ class StripsRequest:
         """Whether it refers to vertices of the design."""
         named = len(self.kept) or self.constraints or self.seams.preferences
         return bool(named or self.start.points is not None)
+
+
+def own_names(preferences: Sequence[str]) -> list[str]:
+    """Return the names that preferences of the search for pieces have here."""
+    return ["seams_along" if name == "along" else name for name in preferences]

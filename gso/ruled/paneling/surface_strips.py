@@ -79,6 +79,15 @@ def check_whole(mesh: Mesh) -> None:
         )
 
 
+def is_whole(mesh: Mesh) -> bool:
+    """Tell whether a mesh is one surface that can be made of strips."""
+    try:
+        check_whole(mesh)
+    except MeshError:
+        return False
+    return True
+
+
 def of_surface(design: Mesh, request: StripsRequest, bound: float | None) -> Result:
     """Make strips near a surface, without a verdict.
 
@@ -220,6 +229,19 @@ def lines_of(design: Mesh, request: StripsRequest) -> LineStrips | None:
         ways = along.directions(Mesh(mesh.vertices, mesh.triangles))
         lines = LineStrips(mesh, told, lambda: grid_copies(mesh, ways), along.directions)
     return lines if lines.choices else None
+
+
+def unaligned(lines: LineStrips | None, number: int | None) -> str:
+    """Return why no strips run along a direction."""
+    if lines is not None and number is not None and not lines.least <= number <= lines.most:
+        return (
+            f"{number} strips are too {'few' if number < lines.least else 'many'} along the given "
+            f"direction; ask for {lines.least} to {lines.most}"
+        )
+    return (
+        "no strips run along the given direction: this takes one component of quads, or a disk or "
+        "a tube; leave `along` out"
+    )
 
 
 def along_lines(
