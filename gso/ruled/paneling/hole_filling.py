@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gso import metrics
+from gso import geometry, metrics
 from gso.deformation import ThinPlateField
 from gso.geometry.plane import loop_axes
-from gso.geometry.polygon import perimeter, signed_area
+from gso.geometry.polygon import perimeter
 from gso.mesh import Mesh
 from gso.metrics.hole_defects import turning
 from gso.typing import Array, Ints
@@ -125,7 +125,8 @@ def _patch(corners: Array, loop: Ints, first: int) -> tuple[Array, Ints, float] 
         return None
     every = np.concatenate([flat, inside])
     triangles = triangles[shapely.contains_xy(outline, every[triangles].mean(axis=1))]
-    triangles = np.array([t if signed_area(every[t]) > 0 else t[::-1] for t in triangles])
+    clockwise = geometry.signed_areas(every, triangles) < 0
+    triangles[clockwise] = triangles[clockwise, ::-1]
     if not _is_filled(triangles, len(loop)):
         return None
     new = middle + inside @ axes[:2] + np.outer(np.nan_to_num(heights), axes[2])
@@ -139,9 +140,8 @@ def _lattice(outline: Array, step: float) -> Array:
     y = np.arange(low[1], high[1], np.sqrt(0.75) * step)
     x = np.arange(low[0] - step, high[0] + step, step)
     shift = 0.5 * step * (np.arange(len(y)) % 2)
-    return np.stack(
-        [x[None, :] + shift[:, None], np.broadcast_to(y[:, None], (len(y), len(x)))], 2
-    ).reshape(-1, 2)
+    x, y = np.broadcast_arrays(x + shift[:, None], y[:, None])
+    return np.stack([x, y], axis=2).reshape(-1, 2)
 
 
 def _is_filled(triangles: Ints, count: int) -> bool:
