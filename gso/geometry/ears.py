@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gso.geometry.polygon import signed_area
+from gso.geometry.polygon import area_vector, signed_area
 from gso.geometry.vectors import cross, unit
 from gso.typing import Array, Ints
 
@@ -127,7 +127,7 @@ def in_plane(polygon: Array) -> Array:
         It has no area.
     """
     p = polygon - polygon.mean(axis=0)
-    normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+    normal = area_vector(polygon)
     size = float(np.linalg.norm(normal))
     if size == 0.0:
         raise ValueError("it has no area")

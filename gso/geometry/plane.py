@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gso.geometry.vectors import cross, unit
+from gso.geometry.polygon import area_vector
+from gso.geometry.vectors import unit
 from gso.typing import Array
 
 #: Relative difference of distances that count as the same.
@@ -49,7 +50,7 @@ def loop_axes(loop: Array) -> Array:
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
     away = loop - loop.mean(axis=0)
-    normal = unit(cross(away, np.roll(away, -1, axis=0)).sum(axis=0))
+    normal = unit(area_vector(loop))
     away = away - np.outer(away @ normal, normal)
     far = np.linalg.norm(away, axis=1)
     first = unit(away[int((far > (1.0 - _SAME) * far.max()).argmax())])

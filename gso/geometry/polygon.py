@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gso.geometry.vectors import cross
 from gso.typing import Array, Ints
 
 #: Area of a corner of a quad, relative to the quad's, below which it is in a line.
@@ -20,6 +21,18 @@ def signed_area(polygon: Array) -> float:
     """
     x, y = polygon.T
     return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+
+
+def area_vector(polygon: Array) -> Array:
+    """Return the doubled area vector (3,) of a closed polygon (k, 3).
+
+    It points to where the polygon is anticlockwise.
+
+    >>> area_vector(np.array([[0.0, 0, 5], [2, 0, 5], [2, 1, 5], [0, 1, 5]])).tolist()
+    [0.0, 0.0, 4.0]
+    """
+    away = polygon - polygon.mean(axis=0)
+    return np.asarray(cross(away, np.roll(away, -1, axis=0)).sum(axis=0))
 
 
 def anticlockwise(polygon: Array) -> Array:

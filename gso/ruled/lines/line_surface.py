@@ -12,7 +12,7 @@ from gso.mesh import Mesh, Nearest, topology
 from gso.parametrization import beside, upright
 from gso.pattern import Pattern
 from gso.ruled.fold_lines import Folds, bend_radii
-from gso.ruled.lines.polygons import Polygons
+from gso.ruled.lines.polygons import Polygons, area_vectors, inner_edges, middles, sides
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.sheet import seam_pairs
 from gso.ruled.strip_layout import Strips
@@ -97,17 +97,12 @@ class _Planes:
     @classmethod
     def of(cls, rings: list[Ints], vertices: Array) -> _Planes:
         """Return the planes of polygons, seen from where these are anticlockwise."""
-        size = np.array([len(ring) for ring in rings])
-        owner, ids = np.repeat(np.arange(len(rings)), size), np.concatenate(rings)
-        after = np.concatenate([np.roll(ring, -1) for ring in rings])
-        origin = _summed(owner, vertices[ids], len(rings)) / size[:, None]
-        p, q = vertices[ids] - origin[owner], vertices[after] - origin[owner]
-        normal = unit(_summed(owner, cross(p, q), len(rings)))
+        every, owner = sides(rings)
+        way = np.diff(vertices[every], axis=1)[:, 0]
+        origin, normal = middles(rings, vertices), unit(area_vectors(rings, vertices))
         # The longest side is along the first axis.
-        long = lengths(q - p)
-        order = np.lexsort((-long, owner))
-        first = order[np.r_[0, np.cumsum(size)[:-1]]]
-        way = (q - p)[first]
+        order = np.lexsort((-lengths(way), owner))
+        way = way[order[np.flatnonzero(np.diff(owner, prepend=-1))]]
         way = unit(way - np.einsum("pd,pd->p", way, normal)[:, None] * normal)
         return cls(origin, normal, np.stack([way, cross(normal, way)], axis=1))
 
@@ -115,10 +110,6 @@ class _Planes:
         """Return complex coordinates (k,) of points (k, 3) in the planes of polygons (k,)."""
         both = np.einsum("kid,kd->ki", self.axes[polygon], points - self.origin[polygon])
         return np.asarray(both @ np.array([1.0, 1j]))
-
-
-def _summed(owner: Ints, values: Array, count: int) -> Array:
-    return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
 
 
 def _faces(rings: list[Ints], vertices: Array) -> tuple[Ints, Ints]:
@@ -140,16 +131,8 @@ def _faces(rings: list[Ints], vertices: Array) -> tuple[Ints, Ints]:
 
 def _edges(rings: list[Ints], rulings: Ints) -> tuple[Ints, Ints]:
     """Return the rulings and the other inner edges, (k, 4) each: two polygons and two ends."""
-    size = np.array([len(ring) for ring in rings])
-    owner, a = np.repeat(np.arange(len(rings)), size), np.concatenate(rings)
-    b = np.concatenate([np.roll(ring, -1) for ring in rings])
-    count = int(a.max()) + 1
-    key = topology.edge_keys(a, b, count)
-    order = np.argsort(key, kind="stable")
-    i = np.flatnonzero(key[order][1:] == key[order][:-1])
-    one, two = order[i], order[i + 1]
-    inner = np.stack([owner[one], owner[two], a[one], b[one]], axis=1)
-    is_ruling = np.isin(key[one], topology.pair_keys(rulings, count))
+    inner, count = inner_edges(rings), int(max(ring.max() for ring in rings)) + 1
+    is_ruling = np.isin(topology.pair_keys(inner[:, 2:], count), topology.pair_keys(rulings, count))
     return inner[is_ruling], inner[~is_ruling]
 
 

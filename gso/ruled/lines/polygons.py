@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gso.geometry.vectors import cross, lengths
+from gso.mesh import topology
 from gso.typing import Array, Ints
 
 
@@ -75,3 +76,38 @@ def _base(points: Array, ids: Ints) -> Ints:
     p, at = np.nonzero(other)
     base = np.stack([ids[rows, k] for k in (a, b, c)], axis=1)
     return np.column_stack([base[p], ids[p, at]])
+
+
+def sides(rings: list[Ints]) -> tuple[Ints, Ints]:
+    """Return the sides (s, 2) of polygons, one polygon after the other, and the polygon of each."""
+    after = np.concatenate([np.roll(ring, -1) for ring in rings])
+    owner = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    return np.stack([np.concatenate(rings), after], axis=1), owner
+
+
+def inner_edges(rings: list[Ints]) -> Ints:
+    """Return the edges between polygons, (e, 4): the polygons on both sides, and the two ends."""
+    every, owner = sides(rings)
+    key = topology.pair_keys(every, int(every.max()) + 1)
+    order = np.argsort(key, kind="stable")
+    i = np.flatnonzero(key[order][1:] == key[order][:-1])
+    one, two = order[i], order[i + 1]
+    return np.column_stack([owner[one], owner[two], every[one]])
+
+
+def middles(rings: list[Ints], points: Array) -> Array:
+    """Return the means (p, 3) of the corners of polygons."""
+    size = np.array([len(ring) for ring in rings])
+    owner = np.repeat(np.arange(len(rings)), size)
+    return np.asarray(_summed(owner, points[np.concatenate(rings)], len(rings)) / size[:, None])
+
+
+def area_vectors(rings: list[Ints], points: Array) -> Array:
+    """Return the doubled area vectors (p, 3) of polygons."""
+    every, owner = sides(rings)
+    p, q = (points[every] - middles(rings, points)[owner][:, None]).transpose(1, 0, 2)
+    return _summed(owner, cross(p, q), len(rings))
+
+
+def _summed(owner: Ints, values: Array, count: int) -> Array:
+    return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)

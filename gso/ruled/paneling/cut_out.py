@@ -18,7 +18,7 @@ from gso.geometry.vectors import cross, lengths, unit
 from gso.mesh import Mesh, Nearest, topology
 from gso.ruled.fold_lines import Folds
 from gso.ruled.lines.line_surface import line_surface
-from gso.ruled.lines.polygons import Polygons
+from gso.ruled.lines.polygons import Polygons, area_vectors, inner_edges, sides
 from gso.ruled.ruled_surface import RuledSurface
 from gso.ruled.surface_polygons import SurfacePolygons
 from gso.typing import Array, Flags, Ints
@@ -111,12 +111,11 @@ class _Cut:
         axes = loop_axes(moved)
         flat = self.points @ axes[:2].T
         hole = region(moved @ axes[:2].T)
-        owner = np.repeat(np.arange(len(self.rings)), [len(ring) for ring in self.rings])
-        corners = flat[np.concatenate(self.rings)]
-        shapes = shapely.polygons(shapely.linearrings(corners, indices=owner))
+        every, owner = sides(self.rings)
+        shapes = shapely.polygons(shapely.linearrings(flat[every[:, 0]], indices=owner))
         at_rim = np.isin(self.origin, self._owner[triangle])
         reached = self._joined(shapely.intersects(shapes, hole), at_rim)
-        normals = _normals([self.points[self.rings[k]] for k in reached])
+        normals = unit(area_vectors(self.rings, self.points)[reached])
         facing = normals @ axes[2]
         seen = (facing > _STEEP).all() or (facing < -_STEEP).all()
         if not (reached.size and seen and shapely.is_valid(shapes[reached]).all()):
@@ -141,15 +140,13 @@ class _Cut:
         pairs : ndarray of int, (r, 2)
             Polygons of the surface on both sides of rulings.
         """
-        return self._hinges(pairs)[2]
+        return self._hinges(pairs)[:, 2:]
 
     def leave_out(self, pairs: Ints, least: float) -> None:
         """Leave out the parts of strips that were cut off and have less than an area."""
-        one, two, _ = self._hinges(pairs)
-        label = topology.label_components(len(self.rings), one, two)
-        corners = [self.points[ring] - self.points[ring[0]] for ring in self.rings]
-        area = [np.linalg.norm(cross(p, np.roll(p, -1, axis=0)).sum(axis=0)) for p in corners]
-        small = np.bincount(label, 0.5 * np.array(area)) < least
+        label = topology.label_components(len(self.rings), *self._hinges(pairs)[:, :2].T)
+        area = 0.5 * lengths(area_vectors(self.rings, self.points))
+        small = np.bincount(label, area) < least
         strip = topology.label_components(int(self.origin.max()) + 1, *pairs.T)[self.origin]
         # What is left of a strip has other parts.
         parts = np.unique(np.stack([strip, label], axis=1), axis=0)[:, 0]
@@ -157,32 +154,19 @@ class _Cut:
         self.rings = [ring for ring, keep in zip(self.rings, kept, strict=True) if keep]
         self.origin = self.origin[kept]
 
-    def _hinges(self, pairs: Ints) -> tuple[Ints, Ints, Ints]:
-        """Return polygons (k,), (k,) that rulings join, and these (k, 2); see :meth:`rulings`."""
-        one, two, edges = self._inner()
+    def _hinges(self, pairs: Ints) -> Ints:
+        """Return those edges with the polygons that they join, as :func:`inner_edges` does."""
+        inner = inner_edges(self.rings)
+        one, two = inner[:, :2].T
         both = np.sort(np.stack([self.origin[one], self.origin[two]], axis=1), axis=1)
         count = int(self.origin.max()) + 1
         known = np.isin(topology.pair_keys(both, count), topology.pair_keys(pairs, count))
         joined = known | (both[:, 0] == both[:, 1])
-        return one[joined], two[joined], edges[joined]
-
-    def _sides(self) -> tuple[Ints, Ints]:
-        """Return the sides (s, 2) of all polygons, and the polygon of each."""
-        after = np.concatenate([np.roll(ring, -1) for ring in self.rings])
-        owner = np.repeat(np.arange(len(self.rings)), [len(ring) for ring in self.rings])
-        return np.stack([np.concatenate(self.rings), after], axis=1), owner
-
-    def _inner(self) -> tuple[Ints, Ints, Ints]:
-        """Return the polygons on both sides of inner edges, (e,) each, and the edges (e, 2)."""
-        sides, owner = self._sides()
-        key = topology.pair_keys(sides, len(self.points))
-        order = np.argsort(key, kind="stable")
-        i = np.flatnonzero(key[order][1:] == key[order][:-1])
-        return owner[order[i]], owner[order[i + 1]], sides[order[i]]
+        return np.asarray(inner[joined])
 
     def _joined(self, near: Flags, start: Flags) -> Ints:
         """Return the polygons of a mask that are joined to those of another, through others."""
-        one, two, _ = self._inner()
+        one, two = inner_edges(self.rings)[:, :2].T
         both = near[one] & near[two]
         label = topology.label_components(len(self.rings), one[both], two[both])
         out: Ints = np.flatnonzero(near & np.isin(label, label[start & near]))
@@ -233,28 +217,21 @@ class _Cut:
 
     def _insert(self, ids: Ints) -> None:
         """Insert vertices into the sides of polygons that they are on."""
-        sides, owner = self._sides()
-        a, b = self.points[sides].transpose(1, 0, 2)
+        every, owner = sides(self.rings)
+        a, b = self.points[every].transpose(1, 0, 2)
         way, long = unit(b - a), lengths(b - a)
         inside: dict[int, list[tuple[int, float, int]]] = {}
         for v in ids.tolist():
             off = self.points[v] - a
             at = np.einsum("sd,sd->s", off, way)
             on = (lengths(cross(off, way)) <= _SAME * self._size) & (at > 0.0) & (at < long)
-            for k in np.flatnonzero(on & (sides != v).all(axis=1)).tolist():
-                place = int(np.flatnonzero(self.rings[owner[k]] == sides[k, 0])[0])
+            for k in np.flatnonzero(on & (every != v).all(axis=1)).tolist():
+                place = int(np.flatnonzero(self.rings[owner[k]] == every[k, 0])[0])
                 inside.setdefault(int(owner[k]), []).append((place, float(at[k]), v))
         for ring, new in inside.items():
             new.sort()
             where = [place + 1 for place, _, _ in new]
             self.rings[ring] = np.insert(self.rings[ring], where, [v for _, _, v in new])
-
-
-def _normals(corners: Sequence[Array]) -> Array:
-    """Return the unit normals (p, 3) of polygons."""
-    away = [polygon - polygon.mean(axis=0) for polygon in corners]
-    sums = [cross(p, np.roll(p, -1, axis=0)).sum(axis=0) for p in away]
-    return unit(np.array(sums).reshape(-1, 3))
 
 
 def _without_rings(shape: Geometry, outline: Array) -> Iterator[Geometry]:

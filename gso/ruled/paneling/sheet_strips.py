@@ -12,6 +12,7 @@ from gso.components import split
 from gso.geometry.flat_region import neck
 from gso.geometry.polygon import rectangle
 from gso.geometry.vectors import lengths
+from gso.mesh import Mesh
 from gso.result import Result, StripsResult
 from gso.ruled.paneling.strips_request import StripsRequest
 from gso.ruled.sheet_division import divided_to_fit
@@ -35,8 +36,11 @@ def against_sheet(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     return _too_large([pattern.flat[part.vertices] for part in split(pattern.mesh)], sheet)
 
 
-def against_parts(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
-    """Return the reasons if parts do not fit the sheet, are pleated, or miss budgets of pieces."""
+def against_parts(result: Result, request: StripsRequest, *, slivers: bool) -> tuple[Reason, ...]:
+    """Return the reasons if parts do not fit the sheet, are pleated, or miss budgets of pieces.
+
+    With `slivers` also if parts that are joined to others are smaller than anybody would make.
+    """
     pattern = result.pattern
     reasons = (*against_sheet(result, request), *_against_pleats(result, request))
     if pattern is None:
@@ -44,24 +48,22 @@ def against_parts(result: Result, request: StripsRequest) -> tuple[Reason, ...]:
     parts = split(pattern.surface(result.mesh))
     sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in parts]
     pieces = 1 if result.pieces is None else len(result.pieces)
-    return (*reasons, *request.seams.reasons(pieces, sheets))
+    reasons += request.seams.reasons(pieces, sheets)
+    if slivers:
+        vertices = [pattern.vertex[part.vertices] for part in parts]
+        shared = np.bincount(np.concatenate([np.unique(own) for own in vertices])) > 1
+        joined = [s for s, own in zip(sheets, vertices, strict=True) if shared[own].any()]
+        reasons += _against_slivers(joined, result.design)
+    return reasons
 
 
-def against_slivers(result: Result) -> tuple[Reason, ...]:
+def _against_slivers(joined: Sequence[Sheet], design: Mesh) -> tuple[Reason, ...]:
     """Return the reasons if parts that are joined to others are smaller than anybody would make."""
-    design, pattern = result.design, result.pattern
-    if pattern is None:
-        return ()
-    parts = split(pattern.surface(result.mesh))
-    own = np.concatenate([np.unique(pattern.vertex[part.vertices]) for part in parts])
-    shared = np.bincount(own) > 1
-    joined = [part for part in parts if shared[pattern.vertex[part.vertices]].any()]
-    sheets = [Sheet(part.mesh, pattern.flat[part.vertices]) for part in joined]
-    if not sheets:
+    if not joined:
         return ()
     least = least_neck(design.size)
-    necks = np.array([neck(sheet.region, least) for sheet in sheets])
-    measured = too_small(sheets, metrics.area(design), design.size, "part")
+    necks = np.array([neck(sheet.region, least) for sheet in joined])
+    measured = too_small(joined, metrics.area(design), design.size, "part")
     return compare(measured | {Code.NECK: Measurement(necks, "part")}, {Code.NECK: least})
 
 

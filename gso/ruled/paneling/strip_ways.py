@@ -28,7 +28,6 @@ from gso.ruled.paneling.ring_strips import ring_strips
 from gso.ruled.paneling.sheet_strips import (
     against_parts,
     against_sheet,
-    against_slivers,
     divided,
     longest_ruling,
     on_sheets,
@@ -350,11 +349,9 @@ class StripsTask:
 
     def _reasons(self, result: Result, known: Sequence[Reason]) -> tuple[Reason, ...]:
         """Return all reasons against a result, of which those of its verdict are known."""
-        reasons = [*known, *against_parts(result, self.request)]
-        if self.divisible:
-            # Other strips within the distance may be parts that can be made.
-            reasons += against_slivers(result)
-        return ordered(reasons)
+        # Where it may be divided, other strips within the distance may be parts that can be made.
+        found = against_parts(result, self.request, slivers=self.divisible)
+        return ordered([*known, *found])
 
     def _as_a_whole(self, light: LightDesign, tried: Sequence[Tried]) -> list[Tried]:
         asked = self.request
