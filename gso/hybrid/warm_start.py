@@ -11,10 +11,10 @@ import numpy as np
 
 from gso import metrics
 from gso.dataset.screen import CURVED
-from gso.errors import MeshError
+from gso.errors import MeshError, WeightsError
 from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import NetLike, available, chain, exported, in_turn, missing_packages
+from gso.net.catalogue import NetLike, chain, exported, in_turn, missing_packages
 from gso.typing import Array
 
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
@@ -121,8 +121,11 @@ def _missing(task: str, net: NetLike | None, alone: bool) -> str:
         return f"no net makes a start for task {task!r}"
     if why := missing_packages(net):
         return why
-    if net is None and tasks.get(task).default not in available(task):
-        return f"no net for task {task!r} comes with this version"
+    if net is None:
+        try:
+            chain(net, task)
+        except WeightsError:
+            return f"no net for task {task!r} comes with this version"
     return ""
 
 

@@ -158,8 +158,7 @@ class Run:
             if number == 0:
                 self.start_refused = plan.start_refused
             if guarded and not self.start_refused:
-                plan = _enter_first(plan)
-                self.start_refused = _reason_against_start(plan)
+                plan, self.start_refused = _against_cold_start(_enter_first(plan))
             if number == 0:
                 self._planned = (request, plan)
             self.timings.setup += time.perf_counter() - clock
@@ -333,7 +332,12 @@ def _guard(plan: Plan, state: PlanState) -> tuple[Array, dict[str, float]]:
     stage, coordinates = state.stage, state.coordinates
     if plan.fallback is None:
         return coordinates, (state.energies or objective(stage, coordinates))[0]
-    energy, other = state.energies or objective(stage, coordinates, plan.fallback)
+    if state.energies is not None:
+        energy, other = state.energies
+    elif plan.fallback_energy is not None and stage is plan.stages[-1]:
+        energy, other = objective(stage, coordinates)[0], plan.fallback_energy
+    else:
+        energy, other = objective(stage, coordinates, plan.fallback)
     if not sum(energy.values()) <= sum(other.values()):
         return plan.fallback, other
     return coordinates, energy
@@ -349,17 +353,23 @@ def _enter_first(plan: Plan) -> Plan:
     )
 
 
-def _reason_against_start(plan: Plan) -> str:
-    """Say that the start has more energy than a cold start; empty if it has not."""
+def _against_cold_start(plan: Plan) -> tuple[Plan, str]:
+    """Say that the start has more energy than a cold start; empty if it has not.
+
+    The plan is returned with its fallback's energy, if that is the start.
+    """
     if plan.cold_start is None or not plan.stages:
-        return ""
+        return plan, ""
     # A spline is fitted to the result of the stage before its own: compare there.
     stages = plan.stages if plan.spline is None else plan.stages[:-1]
     coordinates = plan.start
     for stage in stages:
         coordinates = stage.enter(coordinates)
     found = objective(stages[-1], coordinates, plan.cold_start())
+    fallback = plan.fallback if stages is plan.stages else None
+    if fallback is not None and np.array_equal(coordinates, fallback):
+        plan = replace(plan, fallback_energy=found[0])
     warm, cold = (sum(energy.values()) for energy in found)
     if warm <= cold:
-        return ""
-    return f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"
+        return plan, ""
+    return plan, f"its energy, {warm:.3g}, is above that of the start without it, {cold:.3g}"

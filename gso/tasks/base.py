@@ -156,6 +156,8 @@ class Plan:
     fallback : ndarray, optional
         Coordinates returned instead of the result if their energy, by the last objective, is
         lower.
+    fallback_energy : dict, optional
+        Their objective of the last stage by term, where it is known.
     finish : callable
         Post-processing of the coordinates that leaves the objective unchanged, such as the
         placement of a flat image.
@@ -187,6 +189,7 @@ class Plan:
     details: dict[str, Any] = field(default_factory=dict)
     finish: Callable[[Array], Array] = same
     fallback: Array | None = None
+    fallback_energy: dict[str, float] | None = None
     result_notes: Callable[[Array], list[str]] | None = None
     spline: tuple[int, int] | None = None
     cold_start: Callable[[], Array] | None = None

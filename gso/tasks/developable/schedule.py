@@ -36,10 +36,12 @@ NOISE_REACH = 2.8
 
 #: Iterations with normal offsets between a warm start and the stage of free vertices.
 _OFFSETS_FIRST = 12
-#: Iterations on the coarsest grid and on the next ones up to `free_size` that correct a start
-#: of known resolution; more for finer designs, for which these grids cost little, and where less
-#: than this share of the energy may be left.
-_CORRECTIONS, _MORE_CORRECTIONS, _CLOSE = (4, 2), (8, 3), 1e-3
+#: Iterations on the coarsest grid and on the next ones up to `free_size` that correct a start of
+#: known resolution, and the relative energy decrease at which those on the next ones end, which are
+#: costly; other numbers, and the usual tolerance, where less than this share of the energy may be
+#: left.
+_CORRECTIONS, _CORRECTED = (4, 4), 0.2
+_MORE_CORRECTIONS, _CLOSE = (8, 3), 1e-3
 #: Coarser grids that a start stands for that is solved already.
 _SOLVED = 3
 #: Factor on the iterations on the coarsest mesh where that is not a grid.
@@ -260,11 +262,13 @@ def _coarse_stage(
         iterations = int(_LONGER * iterations)
     loose = small or o.variables == "free" or not pinned_only(level.constraints)
     kind = "free" if first or (not begun and loose) else "normal"
-    fall = not begun and (first or not grid)
+    fall, tolerance = not begun and (first or not grid), _LOOSE
     if begun and small and start.resolution is not None:
-        fine = not detailed(analysis.mesh, start.resolution) or start.remaining < _CLOSE
-        iterations = (_MORE_CORRECTIONS if fine else _CORRECTIONS)[not first]
-        kind, fall = "free", first and fine
+        close = start.remaining < _CLOSE
+        iterations = (_MORE_CORRECTIONS if close else _CORRECTIONS)[not first]
+        tolerance = _LOOSE if first or close else _CORRECTED
+        fine = not detailed(analysis.mesh, start.resolution)
+        kind, fall = "free", first and (fine or close)
     if request.max_displacement is not None:
         kind = "normal"
     return Stage(
@@ -273,7 +277,7 @@ def _coarse_stage(
         objective(analysis, request, mesh),
         partial(_unknowns, kind, mesh, o),
         iterations=iterations,
-        tolerance=_LOOSE,
+        tolerance=tolerance,
         continuation=_falling(o) if fall else (Absolute(o.eps),),
         continued="curvature",
         bounds=offset_bounds(mesh, radius(request), level.constraints.hard_ids),
