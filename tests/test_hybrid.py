@@ -468,8 +468,8 @@ def test_without_torch_it_is_the_optimiser(monkeypatch, surfaces, optimum):
     assert result.warm_start == "cold"
 
 
-def test_without_weights_it_is_the_optimiser(monkeypatch, surfaces, optimum):
-    monkeypatch.setattr("gso.hybrid.warm_start.available", lambda task: [])
+def test_without_weights_it_is_the_optimiser(monkeypatch, tmp_path, surfaces, optimum):
+    monkeypatch.setattr("gso.net.catalogue.FOLDER", tmp_path)
     cold, result = optimum(0), hybrid.solve(surfaces[0])
     assert same(cold, result)
     assert "no net" in result.notes[-1]
