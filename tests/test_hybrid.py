@@ -476,6 +476,15 @@ def test_without_weights_it_is_the_optimiser(monkeypatch, tmp_path, surfaces, op
 
 
 @needs_torch
+def test_a_developable_design_is_left_as_it_is():
+    u, v = np.meshgrid(np.linspace(-1, 1, 24), np.linspace(-1, 1, 24), indexing="ij")
+    design = np.stack([u, v, 0.3 * u * u], axis=-1)
+    result = hybrid.solve(design)
+    assert result.warm_start == "cold" and np.array_equal(result.mesh.grid, design)
+    assert "developable as it is" in result.notes[-1]
+
+
+@needs_torch
 def test_a_small_grid_is_the_optimisers():
     cold, result = tno.optimize(saddle(5)), hybrid.solve(saddle(5), net=made(size=0.01))
     assert same(cold, result)

@@ -79,6 +79,8 @@ print(spent() - spent())
 #: Relative energy decrease of an iteration at which :func:`gso.hybrid.solve` ends solves other than
 #: those by curvature.
 NEARLY = 2e-3
+#: Share of the cold solve's time above which a hybrid solve counts as slower.
+SLOWER = 1.05
 #: Share by which the section "guard" stretches designs along x, to measure how much the cold solves
 #: of two practically equal designs differ.
 STRETCH = 1e-6
@@ -174,6 +176,8 @@ def costs(found: dict[str, np.ndarray]) -> dict[str, Any]:
     for part in ("solver", "total"):
         share = found[f"hybrid {part}"] / found[f"cold {part}"]
         out |= {f"{part} ratio": float(np.median(share)), f"{part} worst": float(share.max())}
+        if part == "solver":
+            out["% slower"] = 100.0 * float((share > SLOWER).mean())
     out |= {"started %": 100.0 * float(found["started"].mean()), **ratios(found["energy"])}
     out["strain 9 in 10"] = float(np.quantile(found["strain"], 0.9))
     early: dict[str, Any] = {"early ratio": "", "early energy": ""}
@@ -184,14 +188,17 @@ def costs(found: dict[str, np.ndarray]) -> dict[str, Any]:
     return out | early
 
 
-def speed(n: int = 32, data: Path | None = None) -> dict[str, Any]:
-    """Print time and energy of the same surfaces, cold and from the net's result."""
+def speed(n: int = 32, data: Path | None = None, case: str = "") -> dict[str, Any]:
+    """Print time and energy of the same surfaces, cold and from the net's result.
+
+    `case` is one of :data:`CASES`; all by default.
+    """
     chosen = first(n, data)
     rows: dict[Any, dict[str, Any]] = {}
-    for name, case in CASES.items():
-        compared(chosen[:1], case)  # imports and code generation of the first use
+    for name, asked in {case: CASES[case]}.items() if case else CASES.items():
+        compared(chosen[:1], asked)  # imports and code generation of the first use
         some = chosen if name in ("balanced", "accurate") else chosen[: max(n // 4, 1)]
-        rows[name] = costs(compared(progress(some, name), case))
+        rows[name] = costs(compared(progress(some, name), asked))
     title = "Speed: CPU time; medians; energies and strains over the cold ones"
     return tabulate(title, ["case"], rows)
 

@@ -15,6 +15,7 @@ from gso.errors import MeshError, WeightsError
 from gso.mesh import Mesh
 from gso.net import tasks
 from gso.net.catalogue import NetLike, chain, exported, in_turn, missing_packages
+from gso.tasks.developable import Options
 from gso.typing import Array
 
 #: Least side of a grid for which a net is used; other meshes need the square of it in vertices.
@@ -149,8 +150,10 @@ def _check_size(design: Mesh, task: str) -> None:
 
 
 def _check_curvature(grid: Array) -> None:
-    """Refuse surfaces far more curved than the training data, where nets are unreliable."""
+    """Refuse surfaces that are developable, or far more curved than the training data."""
     curved = metrics.loss_gc(grid)
+    if curved <= Options().developable_below:
+        raise MeshError("the design is developable as it is")
     if curved > CURVED:
         raise MeshError(
             f"mean |K| in the unit ball is {curved:.3g}, and above {CURVED:.2g} is too far from "

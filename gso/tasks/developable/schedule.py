@@ -34,8 +34,9 @@ from gso.unknowns import Layout, Variables, free, normal_offsets, spline_offsets
 NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
 
-#: Iterations with normal offsets between a warm start and the stage of free vertices.
-_OFFSETS_FIRST = 12
+#: Most iterations with normal offsets between a warm start and the stage of free vertices, and
+#: their tolerance.
+_OFFSETS_FIRST, _OFFSETS_LOOSE = 12, 1e-2
 #: Iterations on the coarsest grid and on the next ones up to `free_size` that correct a start of
 #: known resolution, and the relative energy decrease at which those on the next ones end, which are
 #: costly; other numbers, and the usual tolerance, where less than this share of the energy may be
@@ -210,7 +211,7 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
     if o.variables == "free" and request.x0 is not None:
         # Normal offsets remove most of the remaining energy at a third of the cost.
         first = stage("normal", _OFFSETS_FIRST, falling)
-        return [replace(first, tolerance=_LOOSE), last]
+        return [replace(first, tolerance=_OFFSETS_LOOSE), last]
     return [last]
 
 
