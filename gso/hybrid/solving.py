@@ -78,8 +78,8 @@ def solve(
     - No net is available: none for the task, or PyTorch is not installed, or, for an exported net
       (a .onnx file), ONNX Runtime. Warm starts of the task
       "flatten" were not found to help.
-    - The design is no grid: warm starts of other meshes were not found to help. It is small, or
-      has far more curvature than the training data.
+    - The design is no grid: warm starts of other meshes were not found to help. It is small,
+      developable as it is, or has far more curvature than the training data.
     - The design is cut into pieces, or `max_deviation` or the formulation "ruled" is asked for:
       warm starts were not found to help there.
     - The net's result is not finite, or has a higher energy than the cold start.
