@@ -37,11 +37,11 @@ NOISE_REACH = 2.8
 #: Most iterations with normal offsets between a warm start and the stage of free vertices, and
 #: their tolerance.
 _OFFSETS_FIRST, _OFFSETS_LOOSE = 12, 1e-2
-#: Iterations on the coarsest grid and on the next ones up to `free_size` that correct a start of
-#: known resolution, and the relative energy decrease at which those on the next ones end, which are
-#: costly; other numbers, and the usual tolerance, where less than this share of the energy may be
-#: left.
+#: Most iterations that correct a start of known resolution, on the coarsest grid and on the next
+#: ones up to `free_size`. On the next ones they are costly, and end when one of them lowers the
+#: energy by less than this share of it.
 _CORRECTIONS, _CORRECTED = (4, 4), 0.2
+#: Most iterations, with the usual tolerance, where less than this share of the energy may be left.
 _MORE_CORRECTIONS, _CLOSE = (8, 3), 1e-3
 #: Coarser grids that a start stands for that is solved already.
 _SOLVED = 3
