@@ -360,8 +360,8 @@ def test_the_optimiser_alone(run, small, never):
         assert done.exit_code == 0
 
 
-def test_without_a_net_the_optimiser_says_so(run, small, monkeypatch):
-    monkeypatch.setattr("gso.hybrid.warm_start.available", lambda task: [])
+def test_without_a_net_the_optimiser_says_so(run, small, monkeypatch, tmp_path):
+    monkeypatch.setattr("gso.net.catalogue.FOLDER", tmp_path)
     done = run("optimize", small, "-o", "out.obj", "--method", "hybrid")
     assert done.exit_code == 0
     assert "note: solved without a net: no net" in done.stdout

@@ -35,7 +35,7 @@ NOISE_ONLY = 0.1
 NOISE_REACH = 2.8
 
 #: Most iterations with normal offsets between a warm start and the stage of free vertices, and
-#: their tolerance.
+#: their tolerance after a start of known resolution.
 _OFFSETS_FIRST, _OFFSETS_LOOSE = 12, 1e-2
 #: Most iterations that correct a start of known resolution, on the coarsest grid and on the next
 #: ones up to `free_size`. On the next ones they are costly, and end when one of them lowers the
@@ -211,7 +211,7 @@ def _stages(analysis: Analysis, request: Request[Options], coarser_meshes: int) 
     if o.variables == "free" and request.x0 is not None:
         # Normal offsets remove most of the remaining energy at a third of the cost.
         first = stage("normal", _OFFSETS_FIRST, falling)
-        return [replace(first, tolerance=_OFFSETS_LOOSE), last]
+        return [replace(first, tolerance=_OFFSETS_LOOSE if known else _LOOSE), last]
     return [last]
 
 
