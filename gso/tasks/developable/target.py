@@ -30,6 +30,9 @@ _ANY = 1e300
 #: Largest numbers of solves in one search, and of bisection steps between two of its results.
 _SOLVES = 10
 _BLENDS = 25
+#: Ratio of the weights that meet and that miss a bound, below which a search ends; the second where
+#: its result is not interpolated between theirs.
+_BRACKET, _NARROW = 1.12, 1.02
 #: Range of weights in a search. Beyond it fairness has no effect, and surfaces crumple.
 _RANGE = (1e-2, 1e3)
 #: A solve that leaves more than this share of the value makes no progress. A search in which no
@@ -163,7 +166,8 @@ def reach(run: Runner, request: SearchRequest, bound: Bound) -> tuple[Solution, 
         least = min(least, value)
         if found.best is None and obstacles == _OBSTACLES:
             break
-        if not _RANGE[0] < weight < _RANGE[1] or (np.isfinite(high) and high < 1.02 * low):
+        narrow = _BRACKET if found.interpolates(last) else _NARROW
+        if not _RANGE[0] < weight < _RANGE[1] or (np.isfinite(high) and high < narrow * low):
             break
         weight = _next(weight, value, bound.aim, low, high, value_low, value_high)
     chosen = found.choose(last)
@@ -216,10 +220,14 @@ class _Found:
         best.status = Status.CANCELLED if last.status is Status.CANCELLED else status
         return best
 
+    def interpolates(self, solution: Solution) -> bool:
+        """Return whether surfaces between a solution and that which missed are results, too."""
+        hard = any(part.hard for part in self.run.analysis.constraints.parts)
+        return self.missed is not None and solution.spline is None and not hard
+
     def _blend(self, solution: Solution) -> Solution:
         """Return a solution moved towards the surface that missed, as far as the bound allows."""
-        linear = not any(part.hard for part in self.run.analysis.constraints.parts)
-        if self.missed is None or solution.spline is not None or not linear:
+        if self.missed is None or not self.interpolates(solution):
             return solution
         far, near = self.missed[0], solution.points
         low, high = 0.0, 1.0
