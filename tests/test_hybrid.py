@@ -664,7 +664,7 @@ def test_many(workers, surfaces):
         assert items[k].result.warm_start == alone.warm_start
 
 
-@pytest.mark.parametrize(("polish", "passes"), [(True, 1), (3, None), (False, None)])
+@pytest.mark.parametrize(("polish", "passes"), [(True, 2), (3, None), (False, None)])
 def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, polish, passes):
     seen = []
 

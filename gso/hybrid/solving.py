@@ -41,7 +41,7 @@ from gso.typing import Array, Keywords, MeshLike
 _BATCH = 64
 #: Passes of a net for a warm start. A solve on a coarser grid makes the large-scale changes of
 #: further passes as well, in less time.
-_PASSES = 1
+_PASSES = 2
 #: Whether a net is to be used for a design.
 Worth: TypeAlias = "Callable[[Mesh], bool]"
 #: Notes on results that do not begin with the net's.
