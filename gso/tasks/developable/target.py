@@ -221,9 +221,9 @@ class _Found:
         return best
 
     def interpolates(self, solution: Solution) -> bool:
-        """Return whether surfaces between a solution and that which missed are results, too."""
+        """Return whether surfaces between a solution and another one are results, too."""
         hard = any(part.hard for part in self.run.analysis.constraints.parts)
-        return self.missed is not None and solution.spline is None and not hard
+        return solution.spline is None and not hard
 
     def _blend(self, solution: Solution) -> Solution:
         """Return a solution moved towards the surface that missed, as far as the bound allows."""
