@@ -33,6 +33,9 @@ _BLENDS = 25
 #: Ratio of the weights that meet and that miss a bound, below which a search ends; the second where
 #: its result is not interpolated between theirs.
 _BRACKET, _NARROW = 1.12, 1.02
+#: Outside of a bracket, the logarithm of the factor for the weight, relative to that of the value
+#: over the target: for more weight, and for less. Factors change a weight by at least the last.
+_MORE, _LESS, _LEAST = 1.2, 0.85, 1.1
 #: Range of weights in a search. Beyond it fairness has no effect, and surfaces crumple.
 _RANGE = (1e-2, 1e3)
 #: A solve that leaves more than this share of the value makes no progress. A search in which no
@@ -276,5 +279,6 @@ def _next(
             np.log(value_low) - np.log(max(value_high, 1e-12)), 1e-12
         )
         return float(np.exp(a + np.clip(share, 0.1, 0.9) * (b - a)))
-    factor = float(np.clip((max(value, 1e-12) / aim) ** 1.2, 0.1, 10.0))
-    return weight * (min(factor, 0.5) if np.isfinite(high) else max(factor, 1.5))
+    less = np.isfinite(high)
+    factor = float(np.clip((max(value, 1e-12) / aim) ** (_LESS if less else _MORE), 0.1, 10.0))
+    return weight * (min(factor, 1.0 / _LEAST) if less else max(factor, _LEAST))
