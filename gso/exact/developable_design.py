@@ -15,7 +15,7 @@ from gso.exact.sliced_pattern import SlicedPattern, shape_size
 from gso.mesh import Mesh
 from gso.pattern import Folded, Pattern, Zone
 from gso.quantities import Length, Strain
-from gso.recognition import Recognised, recognise
+from gso.recognition import Recognised, has_rows, recognise
 from gso.typing import Array, Ints
 from gso.unfolding import join_patches
 from gso.unfolding.dual_edges import dual_edges
@@ -157,8 +157,8 @@ def folded_pattern(
         are rolled in any case.
     rows : bool
         Whether single rows of facets with smooth folds between them are cones and cylinders: they
-        may be rows of a surface that is curved both ways, too. Not in meshes of more than 20,000
-        faces, which are not that coarse.
+        may be rows of a surface that is curved both ways, too. Only in meshes with folds of 5 to 30
+        degrees and up to 20,000 faces: others have none.
     parts : array_like of int, (m,), optional
         As of :func:`gso.recognition.recognise`.
 
@@ -176,7 +176,7 @@ def folded_pattern(
     >>> found.parts, len(found.folded.edges), float(np.degrees(found.folded.angles).round(6).max())
     (1, 5, 90.0)
     """
-    if rows and len(mesh.faces) > _FINE:
+    if rows and (len(mesh.faces) > _FINE or not has_rows(mesh)):
         return None
     shape = recognise(
         mesh,

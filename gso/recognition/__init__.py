@@ -10,7 +10,7 @@
 from gso.recognition.bend_lines import BendLine, bend_step_of
 from gso.recognition.facet_graph import coordinate_step
 from gso.recognition.fold_diagonals import fold_triangles
-from gso.recognition.recognise import recognise
+from gso.recognition.recognise import has_rows, recognise
 from gso.recognition.round_surface import RoundSurface
 from gso.recognition.shape_face import Recognised, ShapeFace
 
@@ -22,5 +22,6 @@ __all__ = [
     "bend_step_of",
     "coordinate_step",
     "fold_triangles",
+    "has_rows",
     "recognise",
 ]

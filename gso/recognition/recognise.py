@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from gso.errors import OptionError
 from gso.geometry.vectors import fold_angles
 from gso.io import as_mesh
+from gso.mesh import Mesh
 from gso.quantities import Length, Strain, as_length, as_strain
 from gso.recognition.bend_lines import Step, bend_step_of, lines_of_round, lines_of_strip
 from gso.recognition.facet_graph import SMOOTH, FacetGraph
@@ -135,6 +136,19 @@ def recognise(
     faces += known.torsal_faces(graph, source, step)
     faces.sort(key=lambda face: int(face.triangles[0]))
     return Recognised(graph.points, graph.triangles, divided[source], tuple(faces), graph.tolerance)
+
+
+def has_rows(mesh: Mesh) -> bool:
+    """Return whether single rows of facets may be faces: whether folds are of 5 to 30 degrees.
+
+    Elsewhere `rows` of :func:`recognise` makes no difference.
+
+    >>> angle, height = np.meshgrid(np.linspace(0, 3, 31), [0.0, 20.0, 40.0])
+    >>> has_rows(as_mesh(np.stack([10 * np.cos(angle), 10 * np.sin(angle), height], axis=-1)))
+    True
+    """
+    folds = np.abs(FacetGraph.of(mesh).folds)
+    return bool(((folds > _ROW) & (folds <= SMOOTH)).any())
 
 
 def _regions_of(graph: FacetGraph, parts: Ints) -> list[Region]:
