@@ -285,7 +285,7 @@ def prediction(points=None, net="", refused=""):
 def coarse_net(monkeypatch):
     """Predictions like those of a fair net, and why there is none where that is asked."""
 
-    def predictions(designs, task, net, passes, alone):
+    def predictions(designs, task, net, polish):
         if net == "none":
             return [prediction(refused="there is none")] * len(designs)
         few = gso.DevelopableOptions(iterations=1)
@@ -664,19 +664,13 @@ def test_many(workers, surfaces):
         assert items[k].result.warm_start == alone.warm_start
 
 
-@pytest.mark.parametrize(("polish", "passes"), [(True, 2), (3, None), (False, None)])
-def test_passes_are_left_out_where_a_whole_solve_follows(surfaces, monkeypatch, polish, passes):
-    seen = []
-
-    def asked(designs, task, net, passes, alone):
-        assert alone is (polish is False)
-        seen.append(passes)
-        return [prediction(refused="enough")] * len(designs)
-
-    monkeypatch.setattr("gso.hybrid.solving.predictions", asked)
-    hybrid.solve(surfaces[0], polish=polish)
-    list(hybrid.solve_many([surfaces[0]], polish=polish, workers=0))
-    assert seen == [passes, passes]
+@pytest.mark.parametrize(
+    ("polish", "name"), [(True, "developable-start"), (3, "developable"), (False, "developable")]
+)
+def test_a_net_of_its_own_starts_whole_solves(surfaces, polish, name):
+    assert hybrid.solve(surfaces[0], polish=polish).details["net"] == name
+    (item,) = hybrid.solve_many([surfaces[0]], polish=polish, workers=0)
+    assert item.result.details["net"] == name
 
 
 # ---------------------------------------------------------------- where a net pays
@@ -815,6 +809,21 @@ def test_the_better_of_two_starts_is_refined(large):
         assert energy(result) <= 1.01 * energy(cold), source
     small = Mesh.from_grid(saddle(19))
     assert better_start(small, small.vertices, 64, options, tno.optimize) is None
+
+
+def test_large_grids_are_solved_without_a_net_and_end_early(coarse_net):
+    design = Mesh.from_grid(saddle(256, 9))
+    result = hybrid.solve(design, verdict=False)
+    assert result.warm_start == "cold" and "256 vertices" in result.notes[0]
+    early = tno.optimize(design, x0=Start(None, remaining=3e-3), verdict=False)
+    assert np.array_equal(result.mesh.vertices, early.mesh.vertices)
+    (item,) = hybrid.solve_many([design], verdict=False, workers=0)
+    assert np.array_equal(item.result.mesh.vertices, early.mesh.vertices)
+    for keywords in ({"effort": 1}, {"options": "accurate"}, {"polish": 1}):
+        assert "256 vertices" not in str(hybrid.solve(design, verdict=False, **keywords).notes)
+    spared = hybrid.solve(design, sparing=True, verdict=False)
+    whole = tno.optimize(design, verdict=False)
+    assert np.array_equal(spared.mesh.vertices, whole.mesh.vertices) and spared.notes == ()
 
 
 @pytest.mark.parametrize(

@@ -52,12 +52,10 @@ def _hybrid(task: str) -> Method:
         result = gso.hybrid.solve(case.given, task=task, net=model, verdict=False)
         return replace(_solved(result), more=lambda: {"warm": float(result.warm_start == "net")})
 
-    kind, note = net_tasks.get(task), "the default net, then the optimiser"
-    refused = "" if kind.warm_start else "a closed form has no start to improve"
-    kernels = task in KERNELS
-    return Method(
-        "hybrid", task, run, net=kind.default, note=note, kernels=kernels, refused=refused
-    )
+    kind, note = net_tasks.get(task), "the net for warm starts, then the optimiser"
+    refused = "" if kind.start else "a closed form has no start to improve"
+    kernels, net = task in KERNELS, kind.start or kind.default
+    return Method("hybrid", task, run, net=net, note=note, kernels=kernels, refused=refused)
 
 
 def _init(case: Case) -> Solved:

@@ -27,7 +27,9 @@ from gso import hybrid
 from gso.executors import open_executor
 from gso.hierarchy import resample
 from gso.hybrid import time_model
+from gso.hybrid.plain_solve import LARGE
 from gso.io.json_file import write_json
+from gso.net import tasks
 from gso.pipeline import add_verdict
 from gso.tasks import Limits
 from gso.tno import Start, optimize
@@ -79,8 +81,6 @@ print(spent() - spent())
 #: Relative energy decrease of an iteration at which :func:`gso.hybrid.solve` ends solves other than
 #: those by curvature.
 NEARLY = 2e-3
-#: Passes of the net for a warm start in :func:`gso.hybrid.solve`.
-PASSES = 2
 #: Share of the cold solve's time above which a hybrid solve counts as slower.
 SLOWER = 1.05
 #: Share by which the section "guard" stretches designs along x, to measure how much the cold solves
@@ -212,14 +212,21 @@ def sizes(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     return tabulate(title, ["grid", "preset"], rows)
 
 
-def _by_size(n: int, data: Path | None, name: str) -> dict[tuple[str, str], dict[str, np.ndarray]]:
-    """Compare surfaces of a split on grids of all sizes; fewer of the larger ones."""
+def _by_size(
+    n: int, data: Path | None, name: str, large: bool = True
+) -> dict[tuple[str, str], dict[str, np.ndarray]]:
+    """Compare surfaces of a split on grids of all sizes; fewer of the larger ones.
+
+    `large` says whether grids are among them that are too large for a net.
+    """
     surfaces, found = split(name, data), {}
     for preset, sides in SIZES.items():
         for side, share in sides.items():
+            if not large and preset == "balanced" and side >= LARGE:
+                continue
+            case: Case = ("developable", {"options": preset})
             count = min(max(round(n * share), 2), len(surfaces))
             grids = [resample(np.asarray(surfaces[k], float), side, side) for k in range(count)]
-            case: Case = ("developable", {"options": preset})
             quietly(hybrid.solve, grids[0], options=preset)
             shown = progress(grids, f"{side} {preset}")
             found[f"{side} x {side}", preset] = compared(shown, case)
@@ -232,7 +239,7 @@ def model(n: int = 32, data: Path | None = None) -> dict[str, Any]:
     The file is that of :mod:`gso.hybrid.time_model`.
     """
     presets: dict[str, list[dict[str, float]]] = {preset: [] for preset in SIZES}
-    for (grid, preset), found in _by_size(n, data, "validation").items():
+    for (grid, preset), found in _by_size(n, data, "validation", large=False).items():
         row = {
             "cold": np.median(found["cold total"]),
             "net": np.median(found["hybrid total"]),
@@ -254,8 +261,9 @@ def load(n: int = 5) -> dict[str, Any]:
     """
     rows = {}
     with TemporaryDirectory() as folder:
-        (file,) = gso.net.export("developable", Path(folder, "developable.onnx"), passes=PASSES)
-        for library, net in {"torch": "developable", "onnxruntime": str(file)}.items():
+        name = tasks.get("developable").start
+        (file,) = gso.net.export(name, Path(folder, f"{name}.onnx"))
+        for library, net in {"torch": name, "onnxruntime": str(file)}.items():
             program = [sys.executable, "-c", LOAD, net]
             spent = [
                 float(subprocess.check_output(program, text=True))
@@ -398,7 +406,8 @@ def _started_anyway(name: str, grid: np.ndarray) -> dict[str, float]:
     solve = partial(optimize, design, task=task, verdict=False, **keywords)
 
     def warm() -> gso.Result:
-        moved = gso.net.predict(grid, task=task, passes=PASSES, guarded=False)
+        name = tasks.get(task).start or tasks.get(task).default
+        moved = gso.net.predict(grid, task=task, model=name, guarded=False)
         points = moved.reshape(-1, moved.shape[-1])
         return solve(x0=Start(points, "net", guarded=True, tolerance=NEARLY))
 

@@ -13,6 +13,9 @@ from gso.typing import Keywords
 
 #: Arguments of :func:`gso.tno.optimize` that do not depend on the mesh.
 _ASKED = ("formulation", "options", "max_deviation", "max_strain", "target_curvature", "terms")
+#: Vertices along the longer side of a grid from which on solves for offsets along normals gain
+#: nothing from nets: iterations on the finest grids take nearly all of the time.
+LARGE = 256
 #: Kinds of unknowns of such solves.
 _VARIABLES = ("normal", "free")
 
@@ -56,3 +59,11 @@ def plain_options(design: Mesh, task: str, keywords: Keywords) -> Options | None
     if design.grid_index is None or request.limits.given or keywords.get("constraints"):
         return None
     return options
+
+
+def large_grid(design: Mesh, task: str, keywords: Keywords) -> bool:
+    """Return whether a solve as of :func:`plain_options` is of a grid too large to gain by nets."""
+    options = plain_options(design, task, keywords)
+    if options is None or options.variables != "normal" or design.grid_shape is None:
+        return False
+    return max(design.grid_shape) >= LARGE

@@ -20,7 +20,13 @@ from gso.constraints import Compiled, compile_constraints, listed
 from gso.cut_pieces import Pieces
 from gso.errors import ConvergenceWarning, GSOError, MeshError, OptionError
 from gso.executors import Executor, Item, open_executor
-from gso.hybrid.plain_solve import checked_request, plain_options, without_gain
+from gso.hybrid.plain_solve import (
+    LARGE,
+    checked_request,
+    large_grid,
+    plain_options,
+    without_gain,
+)
 from gso.hybrid.time_model import net_saves_time
 from gso.hybrid.two_starts import better_start
 from gso.hybrid.warm_start import Prediction, predictions
@@ -39,9 +45,6 @@ from gso.typing import Array, Keywords, MeshLike
 
 #: Surfaces that are read and predicted together.
 _BATCH = 64
-#: Passes of a net for a warm start. A solve on a coarser grid makes the large-scale changes of
-#: further passes as well, in less time.
-_PASSES = 2
 #: Whether a net is to be used for a design.
 Worth: TypeAlias = "Callable[[Mesh], bool]"
 #: Notes on results that do not begin with the net's.
@@ -70,8 +73,8 @@ def solve(
     """Solve from a warm start that a net predicts.
 
     The net runs at its own size, and its displacements are carried to the design's grid. Large
-    grids are first solved at the net's size, from the design and from the net's result; the lower
-    minimum of the two is refined.
+    grids with free vertices, or with `effort` from 1 on, are first solved at the net's size, from
+    the design and from the net's result; the lower minimum of the two is refined.
 
     The solve is a cold start, the same as :func:`gso.tno.optimize`, in these cases:
 
@@ -84,7 +87,9 @@ def solve(
       warm starts were not found to help there.
     - The net's result is not finite, or has a higher energy than the cold start.
 
-    The result's `notes` then say so, and its `warm_start` is "cold".
+    Grids with 256 vertices or more along a side are solved without a net, too, where offsets along
+    normals are the unknowns and `effort` is below 1. They end early, as `effort` says, and a net
+    would take longer. The result's `notes` say so in all cases, and its `warm_start` is "cold".
 
     Parameters
     ----------
@@ -95,8 +100,8 @@ def solve(
         As for :func:`gso.tno.optimize`; nets make starts for "developable". Those for "flatten"
         and "denoise" are used only with ``polish=False``.
     net : str, path or net, optional
-        As `model` of :func:`gso.net.predict`; the task's default when not given. Exported nets
-        are applied in the number of passes that they were exported with.
+        As `model` of :func:`gso.net.predict`. When not given, it is the task's net for warm
+        starts ("developable-start") if `polish` is True, and otherwise the task's default.
     polish : bool or int
         True: solve from the net's result, as `effort` says. A number: at most so many
         iterations, with or without a net.
@@ -142,7 +147,7 @@ def solve(
     polish = _checked(task, polish, keywords)
     effort = as_positive(effort, "effort")
     design = mesh if isinstance(mesh, Pieces) else as_mesh(mesh)
-    why = _without_gain(design, task, polish, keywords)
+    why = _without_gain(design, task, polish, effort, keywords)
     if isinstance(design, Pieces) or why:
         refused = Prediction(refused="" if sparing else why)
         return _finished(design, refused, task, polish, effort, keywords)
@@ -156,9 +161,7 @@ def solve(
         return result
     prediction = Prediction()
     if worth is None or worth(design):
-        (prediction,) = predictions(
-            [design], task=task, net=net, passes=_passes(polish), alone=polish is False
-        )
+        (prediction,) = predictions([design], task=task, net=net, polish=polish)
     result = _finished(design, prediction, task, polish, effort, keywords)
     result.seconds["total"] = time.perf_counter() - clock
     return result
@@ -207,13 +210,13 @@ def solve_many(
     """
     keywords.pop("callback", None)
     polish = _checked(task, polish, keywords)
-    work = partial(_one, task, polish, as_positive(effort, "effort"), keywords)
+    effort = as_positive(effort, "effort")
+    work = partial(_one, task, polish, effort, keywords)
     worth: Worth | None = None
     if sparing:
         worth = partial(net_saves_time, task=task, keywords=keywords, net=net, many=True)
-    passes, alone = _passes(polish), polish is False
-    ask = partial(predictions, task=task, net=net, passes=passes, alone=alone)
-    refuse = partial(_without_gain, task=task, polish=polish, keywords=keywords)
+    ask = partial(predictions, task=task, net=net, polish=polish)
+    refuse = partial(_without_gain, task=task, polish=polish, effort=effort, keywords=keywords)
     started = _started(meshes, refuse, worth, ask)
     own = nullcontext(executor) if executor else open_executor(workers, scheduler, main=True)
     with own as ready:
@@ -289,18 +292,28 @@ def _started(
             yield _Started(design, found.get(k, refused))
 
 
-def _without_gain(design: Mesh | Pieces, task: str, polish: bool | int, keywords: Keywords) -> str:
+def _without_gain(
+    design: Mesh | Pieces, task: str, polish: bool | int, effort: float, keywords: Keywords
+) -> str:
     """Say why no net is used, whatever the design's shape; empty if one may be.
 
     Where the net's result itself is wanted, only pieces are a reason against it.
     """
-    alone = polish is False and isinstance(design, Mesh)
-    return "" if alone else without_gain(design, task, keywords)
+    if polish is False and isinstance(design, Mesh):
+        return ""
+    why = without_gain(design, task, keywords)
+    if not why and _ends_early(design, task, polish, effort, keywords):
+        why = f"with {LARGE} vertices along a side or more, nets were not found to help"
+    return why
 
 
-def _passes(polish: bool | int) -> int | None:
-    """Return the number of net passes; None (all) where few or no iterations follow."""
-    return _PASSES if polish is True else None
+def _ends_early(
+    design: Mesh | Pieces, task: str, polish: bool | int, effort: float, keywords: Keywords
+) -> bool:
+    """Return whether a cold solve that ends early is faster than one from a net's result."""
+    if polish is not True or effort >= 1.0 or isinstance(design, Pieces):
+        return False
+    return large_grid(design, task, keywords)
 
 
 def _read(mesh: MeshLike | Pieces) -> Mesh | Pieces | GSOError:
@@ -368,7 +381,9 @@ def _finished(
             refused = str(error)
     if result is None:
         most = None if isinstance(polish, bool) else polish
-        result = optimize(design, task=task, x0=Start(None, iterations=most), **keywords)
+        early = bool(refused) and _ends_early(design, task, polish, effort, keywords)
+        cold = Start(None, iterations=most, remaining=_LEFT[0] if early else 0.0)
+        result = optimize(design, task=task, x0=cold, **keywords)
         if refused:
             result.notes += (f"solved without a net: {refused}",)
     result.seconds["net"] = prediction.seconds

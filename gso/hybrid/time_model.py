@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gso.hybrid.plain_solve import plain_options
+from gso.hybrid.plain_solve import large_grid, plain_options
 from gso.mesh import Mesh
 from gso.net.catalogue import NetLike, exported, in_turn
 from gso.typing import Array, Json, Keywords
@@ -47,7 +47,7 @@ def net_saves_time(
         Whether it is one of many designs, for which the library and the net are loaded once.
     """
     options = plain_options(design, task, keywords)
-    if options is None:
+    if options is None or large_grid(design, task, keywords):
         return False
     preset = _PRESETS[options.variables]
     cold, warm = expected_seconds(preset, len(design.vertices))

@@ -14,7 +14,7 @@ from gso.dataset.screen import CURVED
 from gso.errors import MeshError, WeightsError
 from gso.mesh import Mesh
 from gso.net import tasks
-from gso.net.catalogue import NetLike, chain, exported, in_turn, missing_packages
+from gso.net.catalogue import NetLike, chain, in_turn, missing_packages
 from gso.tasks.developable import Options
 from gso.typing import Array
 
@@ -48,9 +48,8 @@ def predictions(
     designs: Sequence[Mesh],
     task: str,
     net: NetLike | None = None,
-    passes: int | None = None,
     *,
-    alone: bool = False,
+    polish: bool | int = True,
 ) -> list[Prediction]:
     """Apply a net to designs, in one batch for each size of grid.
 
@@ -60,11 +59,10 @@ def predictions(
     task : str
         A task of :func:`gso.tno.optimize`.
     net : str, path or Net, optional
-        As `model` in :func:`gso.net.predict`.
-    passes : int, optional
-        As in :func:`gso.net.predict`; exported nets have their own number.
-    alone : bool
-        Whether the predictions are the final results, not warm starts.
+        As `model` in :func:`gso.net.predict`. When not given, it is the task's net for warm
+        starts if a whole solve follows, and otherwise the task's default.
+    polish : bool or int
+        As for :func:`gso.hybrid.solve`; with False the predictions are the final results.
 
     Raises
     ------
@@ -76,12 +74,12 @@ def predictions(
     for one in in_turn(net) if task in tasks.names() else ():
         if isinstance(one, str | Path):
             chain(one, task)
-    why = _missing(task, net, alone)
+    alone = polish is False
+    why = _missing(task, net, polish)
     if why:
         return [Prediction(refused=why)] * len(designs)
-    if any(map(exported, in_turn(net))):
-        passes = None
-    name = _name(task, net)
+    net = _own(task, polish) if net is None else net
+    name = _name(net)
     found: list[Prediction] = [Prediction()] * len(designs)
     sizes: dict[tuple[int, ...], list[tuple[int, Array]]] = {}
     for k, design in enumerate(designs):
@@ -95,13 +93,13 @@ def predictions(
             elif not alone:
                 raise MeshError("on meshes that are not grids, nets were not found to help")
             else:
-                found[k] = Prediction(_of_mesh(design, task, net, passes), net=name)
+                found[k] = Prediction(_of_mesh(design, task, net), net=name)
         except MeshError as error:
             found[k] = Prediction(net=name, refused=str(error))
         found[k] = replace(found[k], seconds=time.perf_counter() - clock)
     for group in sizes.values():
         clock = time.perf_counter()
-        moved = _predicted(np.stack([grid for _, grid in group]), task, net, passes, alone)
+        moved = _predicted(np.stack([grid for _, grid in group]), task, net, alone)
         share = (time.perf_counter() - clock) / len(group)
         for (k, _), values in zip(group, moved, strict=True):
             clock = time.perf_counter()
@@ -116,23 +114,27 @@ def predictions(
     return found
 
 
-def _missing(task: str, net: NetLike | None, alone: bool) -> str:
+def _missing(task: str, net: NetLike | None, polish: bool | int) -> str:
     """Say why no net can be used, whatever the design; empty if one can."""
-    if task not in tasks.names() or not (alone or tasks.get(task).warm_start):
+    if task not in tasks.names() or not (polish is False or tasks.get(task).start):
         return f"no net makes a start for task {task!r}"
     if why := missing_packages(net):
         return why
     if net is None:
         try:
-            chain(net, task)
+            chain(_own(task, polish), task)
         except WeightsError:
             return f"no net for task {task!r} comes with this version"
     return ""
 
 
-def _name(task: str, net: NetLike | None) -> str:
-    if net is None:
-        return tasks.get(task).default
+def _own(task: str, polish: bool | int) -> str:
+    """Return the name of the task's net that is used unless another is named."""
+    known = tasks.get(task)
+    return known.start if polish is True else known.default
+
+
+def _name(net: NetLike) -> str:
     several = in_turn(net)
     return ", ".join(type(one).__name__ if hasattr(one, "task") else str(one) for one in several)
 
@@ -161,24 +163,22 @@ def _check_curvature(grid: Array) -> None:
         )
 
 
-def _of_mesh(design: Mesh, task: str, net: NetLike | None, passes: int | None) -> Array:
+def _of_mesh(design: Mesh, task: str, net: NetLike) -> Array:
     """Return a net's result at the vertices of a mesh that is no grid."""
     from gso.net import predict
 
-    moved = predict(design, task=task, model=net, passes=passes).vertices
+    moved = predict(design, task=task, model=net).vertices
     return moved[:, : tasks.get(task).components]
 
 
-def _predicted(
-    grids: Array, task: str, net: NetLike | None, passes: int | None, alone: bool
-) -> Sequence[Array | str]:
+def _predicted(grids: Array, task: str, net: NetLike, alone: bool) -> Sequence[Array | str]:
     """Return the result (H, W, d), or the error message, for each grid."""
     from gso.net import predict
 
     try:
         # Where a solve follows, its energy decides whether the result is used.
-        return list(predict(grids, task=task, model=net, passes=passes, guarded=alone))
+        return list(predict(grids, task=task, model=net, guarded=alone))
     except MeshError as error:
         if len(grids) == 1:
             return [str(error)]
-        return [_predicted(grid[None], task, net, passes, alone)[0] for grid in grids]
+        return [_predicted(grid[None], task, net, alone)[0] for grid in grids]

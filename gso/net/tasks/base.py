@@ -41,9 +41,9 @@ class NetTask:
     noisy : bool
         Whether inputs have noise and labels are the surfaces without it. The loss "clean" takes
         the place of "label" and "energy".
-    warm_start : bool
-        Whether the optimiser can start from a result, and gains by it. It does not where its
-        method is in closed form, or its own start is as good.
+    start : str
+        Net whose results are starts of the optimiser, unless another is named. Empty where the
+        optimiser gains nothing by one: its method is in closed form, or its own start is as good.
     refines : bool
         Whether a net can be trained on the results of another net of the task.
     displacement : float
@@ -61,7 +61,7 @@ class NetTask:
     terms: tuple[str, ...]
     energy: Callable[[Batch, Phase, float], Cost] | None = None
     noisy: bool = False
-    warm_start: bool = True
+    start: str = ""
     refines: bool = False
     displacement: float = 0.01
     harm: Callable[[SurfaceLike], tuple[float, ...]] | None = None

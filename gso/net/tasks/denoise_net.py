@@ -20,5 +20,4 @@ TASK = NetTask(
     figures=figures,
     terms=("in", "fair", "gc", "loss_gc"),
     noisy=True,
-    warm_start=False,
 )

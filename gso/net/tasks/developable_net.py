@@ -68,6 +68,7 @@ TASK = NetTask(
     name="developable",
     components=3,
     default="developable",
+    start="developable-start",
     score="score",
     figures=figures,
     terms=("in", "fair", "gc", "loss_gc", "k_left", "d_h", "fair_ratio", "label"),

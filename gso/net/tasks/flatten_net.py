@@ -47,5 +47,4 @@ TASK = NetTask(
     energy=energy,
     displacement=0.03,
     # The optimiser's own start is within a few iterations of the minimum.
-    warm_start=False,
 )
