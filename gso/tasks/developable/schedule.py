@@ -40,7 +40,7 @@ _OFFSETS_FIRST, _OFFSETS_LOOSE = 12, 1e-2
 #: Most iterations that correct a start of known resolution, on the coarsest grid and on the next
 #: ones up to `free_size`. On the next ones they are costly, and end when one of them lowers the
 #: energy by less than this share of it.
-_CORRECTIONS, _CORRECTED = (3, 4), 0.2
+_CORRECTIONS, _CORRECTED = (3, 4), 0.3
 #: Most iterations, with the usual tolerance, where less than this share of the energy may be left.
 _MORE_CORRECTIONS, _CLOSE = (8, 3), 1e-3
 #: Coarser grids that a start stands for that is solved already.
