@@ -64,7 +64,7 @@ SIZES = {
 }
 #: Share of the energy that the cold solve "ended as early" leaves to further iterations: that of
 #: :func:`gso.hybrid.solve`.
-EARLY = 3e-3
+EARLY = 4e-3
 #: A program that prints the CPU seconds to load a net and the library that applies it, after a
 #: cold solve: the first prediction without the time of another one.
 LOAD = """
@@ -80,7 +80,7 @@ print(spent() - spent())
 """
 #: Relative energy decrease of an iteration at which :func:`gso.hybrid.solve` ends solves other than
 #: those by curvature.
-NEARLY = 2e-3
+NEARLY = 3e-3
 #: Share of the cold solve's time above which a hybrid solve counts as slower.
 SLOWER = 1.05
 #: Share by which the section "guard" stretches designs along x, to measure how much the cold solves
