@@ -815,7 +815,7 @@ def test_large_grids_are_solved_without_a_net_and_end_early(coarse_net):
     design = Mesh.from_grid(saddle(256, 9))
     result = hybrid.solve(design, verdict=False)
     assert result.warm_start == "cold" and "256 vertices" in result.notes[0]
-    early = tno.optimize(design, x0=Start(None, remaining=4e-3), verdict=False)
+    early = tno.optimize(design, x0=Start(None, remaining=3.5e-3), verdict=False)
     assert np.array_equal(result.mesh.vertices, early.mesh.vertices)
     (item,) = hybrid.solve_many([design], verdict=False, workers=0)
     assert np.array_equal(item.result.mesh.vertices, early.mesh.vertices)

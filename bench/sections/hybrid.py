@@ -64,7 +64,7 @@ SIZES = {
 }
 #: Share of the energy that the cold solve "ended as early" leaves to further iterations: that of
 #: :func:`gso.hybrid.solve`.
-EARLY = 4e-3
+EARLY = 3.5e-3
 #: A program that prints the CPU seconds to load a net and the library that applies it, after a
 #: cold solve: the first prediction without the time of another one.
 LOAD = """

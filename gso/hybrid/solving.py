@@ -52,7 +52,7 @@ _LOST = "the design's own minimum on a coarse grid is lower than that from the n
 _TOO_FAR = "solved without a net: on a coarse grid its minimum is too far from the design"
 #: Shares of the energy that are left to further iterations: with less than the effort of a cold
 #: solve, and with the same.
-_LEFT = (4e-3, 3e-4)
+_LEFT = (3.5e-3, 3e-4)
 #: Relative energy decrease of an iteration at which other solves from a net's result stop.
 _NEARLY = 3e-3
 #: Vertices along the longer side of a grid, relative to the net's, from which on the cold start is
@@ -114,7 +114,7 @@ def solve(
     effort : float
         Time to aim for, relative to a cold solve, by the formulation "curvature" without limits
         and constraints. Below 1 a solve from a net's result ends when further iterations are
-        expected to lower the energy by less than 0.4 % of it. From 1 on these are 0.03 %, and the
+        expected to lower the energy by less than 0.35 % of it. From 1 on these are 0.03 %, and the
         start is corrected for longer: the result has less energy than that of a cold solve.
     **keywords
         Passed to :func:`gso.tno.optimize`: `formulation`, `options`, `constraints`,
