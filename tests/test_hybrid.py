@@ -875,6 +875,8 @@ def test_a_cold_solve_may_end_earlier(surfaces, optimum):
     early = tno.optimize(surfaces[0], x0=Start(None, remaining=0.01), verdict=False)
     assert early.iterations < whole.iterations
     assert energy(early) <= 1.02 * energy(whole)
+    one = tno.optimize(surfaces[0], x0=Start(None, remaining=0.9), verdict=False)
+    assert (one.history[-1].name, one.history[-1].iteration) == ("normal", 1)
 
 
 def test_no_net_is_asked_where_it_does_not_pay(surfaces, optimum, monkeypatch):

@@ -32,8 +32,9 @@ class Start:
         of it, or than the options' tolerance where that is larger.
     remaining : float
         With or without `points`, the last stage stops when all further iterations together would
-        lower the energy by less than this share of it, as the last two decreases foretell. A
-        solve that converges slowly goes on for longer than with a `tolerance` alone.
+        lower the energy by less than this share of it, as the last two decreases foretell, or after
+        one iteration a third of its decrease. A solve that converges slowly goes on for longer than
+        with a `tolerance` alone.
     resolution : int, optional
         With `points` of a grid: vertices along the longer side of the grid for which they were
         made. Finer grids start from the design, moved as the coarser ones were. By default
