@@ -247,7 +247,6 @@ def cost(n: int = 40) -> dict[str, Any]:
     ways = {"Cholesky factorisation": partial(cholesky_banded, matrix, lower=True)}
     for name in net.available():
         ways[name] = partial(net.predict, surface, task=task_of(name), model=name)
-    ways["developable, one pass"] = partial(net.predict, surface, passes=1)
     spent = {name: np.empty(n) for name in ways}
     for k in range(-1, n):
         for name, way in ways.items():

@@ -209,6 +209,6 @@ def cached(path: Path, device: torch.device) -> Net:
     return _cached(path, device, modified(path))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _cached(path: Path, device: torch.device, stamp: int) -> Net:
     return load(path, device=device)

@@ -97,7 +97,7 @@ def onnx_net(path: Path, device: str | None) -> OnnxNet:
     return _cached(path, device, modified(path))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _cached(path: Path, device: str | None, stamp: int) -> OnnxNet:
     there = onnxruntime.get_available_providers()
     wanted = [_PROVIDERS.get(str(device))] if device else [*reversed(_PROVIDERS.values())]
