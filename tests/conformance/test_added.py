@@ -160,7 +160,6 @@ def lifted():
             },
             terms=("in",),
             energy=energy,
-            warm_start=False,
         )
     )
     gso.net.add_kind("lift", Lift)

@@ -78,7 +78,7 @@ class Lift(Net):
         return self.height * torch.ones_like(surface)
 
 TASK = NetTask(
-    name="lift", components=3, default="lift", score="miss", terms=("in",), warm_start=False,
+    name="lift", components=3, default="lift", score="miss", terms=("in",),
     figures=lambda design, result: {"miss": 0.0},
 )
 """
