@@ -28,6 +28,7 @@ from gso.executors import open_executor
 from gso.hierarchy import resample
 from gso.hybrid import time_model
 from gso.hybrid.plain_solve import LARGE
+from gso.hybrid.solving import LEFT, NEARLY
 from gso.io.json_file import write_json
 from gso.net import tasks
 from gso.pipeline import add_verdict
@@ -62,9 +63,6 @@ SIZES = {
     "balanced": {64: 1.0, 128: 0.5, 256: 0.25, 512: 0.125},
     "accurate": {64: 0.5, 128: 0.25, 256: 0.1},
 }
-#: Share of the energy that the cold solve "ended as early" leaves to further iterations: that of
-#: :func:`gso.hybrid.solve`.
-EARLY = 3.5e-3
 #: A program that prints the CPU seconds to load a net and the library that applies it, after a
 #: cold solve: the first prediction without the time of another one.
 LOAD = """
@@ -78,9 +76,6 @@ def spent():
     return time.process_time() - clock
 print(spent() - spent())
 """
-#: Relative energy decrease of an iteration at which :func:`gso.hybrid.solve` ends solves other than
-#: those by curvature.
-NEARLY = 3e-3
 #: Share of the cold solve's time above which a hybrid solve counts as slower.
 SLOWER = 1.05
 #: Share by which the section "guard" stretches designs along x, to measure how much the cold solves
@@ -149,7 +144,7 @@ def _solved(case: Case, stretched: bool, design: Any) -> dict[str, float]:
         "strain": strains[0] / strains[1],
     }
     if "max_strain" not in keywords:
-        begin = Start(None, remaining=EARLY)
+        begin = Start(None, remaining=LEFT[0])
         early, found["early solver"] = _cpu(optimize, design, **given, verdict=False, x0=begin)
         found["early energy"] = energy(early) / least
     if stretched:
@@ -412,7 +407,7 @@ def _started_anyway(name: str, grid: np.ndarray) -> dict[str, float]:
         return solve(x0=Start(points, "net", guarded=True, tolerance=NEARLY))
 
     (cold, spent), (result, seconds) = _cpu(solve), _cpu(warm)
-    early, soon = _cpu(solve, x0=Start(None, remaining=EARLY))
+    early, soon = _cpu(solve, x0=Start(None, remaining=LEFT[0]))
     least = max(energy(cold), 1e-300)
     for solved in (result, cold):
         if solved.pattern is None:

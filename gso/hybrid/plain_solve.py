@@ -63,7 +63,7 @@ def plain_options(design: Mesh, task: str, keywords: Keywords) -> Options | None
 
 def large_grid(design: Mesh, task: str, keywords: Keywords) -> bool:
     """Return whether a solve as of :func:`plain_options` is of a grid too large to gain by nets."""
-    options = plain_options(design, task, keywords)
-    if options is None or options.variables != "normal" or design.grid_shape is None:
+    if design.grid_shape is None or max(design.grid_shape) < LARGE:
         return False
-    return max(design.grid_shape) >= LARGE
+    options = plain_options(design, task, keywords)
+    return options is not None and options.variables == "normal"

@@ -52,9 +52,9 @@ _LOST = "the design's own minimum on a coarse grid is lower than that from the n
 _TOO_FAR = "solved without a net: on a coarse grid its minimum is too far from the design"
 #: Shares of the energy that are left to further iterations: with less than the effort of a cold
 #: solve, and with the same.
-_LEFT = (3.5e-3, 3e-4)
+LEFT = (3.5e-3, 3e-4)
 #: Relative energy decrease of an iteration at which other solves from a net's result stop.
-_NEARLY = 3e-3
+NEARLY = 3e-3
 #: Vertices along the longer side of a grid, relative to the net's, from which on the cold start is
 #: solved on a coarser grid, too: with less than the effort of a cold solve, and with the same.
 _TWO_STARTS = (4, 2)
@@ -382,7 +382,7 @@ def _finished(
     if result is None:
         most = None if isinstance(polish, bool) else polish
         early = bool(refused) and _ends_early(design, task, polish, effort, keywords)
-        cold = Start(None, iterations=most, remaining=_LEFT[0] if early else 0.0)
+        cold = Start(None, iterations=most, remaining=LEFT[0] if early else 0.0)
         result = optimize(design, task=task, x0=cold, **keywords)
         if refused:
             result.notes += (f"solved without a net: {refused}",)
@@ -415,16 +415,16 @@ def _start(
         # Without iterations the net's result itself is wanted, whatever its energy.
         most = None if polish is True else int(polish)
         guarded = polish is not False
-        return Start(points, "net", guarded=guarded, iterations=most, tolerance=_NEARLY)
+        return Start(points, "net", guarded=guarded, iterations=most, tolerance=NEARLY)
     careful = effort >= 1.0
-    start = Start(points, "net", guarded=True, remaining=_LEFT[careful], resolution=SIZE)
+    start = Start(points, "net", guarded=True, remaining=LEFT[careful], resolution=SIZE)
     if max(design.grid_shape) >= _TWO_STARTS[careful] * SIZE:
         more = {k: v for k, v in keywords.items() if k in ("formulation", "terms")}
         solve = partial(optimize, task=task, **more)
         judged = bool(keywords.get("verdict", True))
         lower = better_start(design, points, SIZE, options, solve, judged)
         if lower is not None:
-            again = replace(lower, guarded=True, remaining=_LEFT[careful])
+            again = replace(lower, guarded=True, remaining=LEFT[careful])
             return lower if lower.points is None else again
     return start
 

@@ -46,5 +46,5 @@ TASK = NetTask(
     terms=("fair", "iso", "iso_w", "iso_cell", "iso_cell_w", "strain", "label"),
     energy=energy,
     displacement=0.03,
-    # The optimiser's own start is within a few iterations of the minimum.
+    # No `start`: the optimiser's own is within a few iterations of the minimum.
 )
