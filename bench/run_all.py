@@ -1,7 +1,7 @@
 """The paper's tables and figures, times, and comparisons with peers, as one report.
 
     python bench/run_all.py --quick      a few surfaces of the repository (five minutes)
-    python bench/run_all.py              640 surfaces of the test split (an hour and a half)
+    python bench/run_all.py              640 surfaces of the test split (half an hour)
     python bench/run_all.py --data DIR   the test split of an existing set
     python bench/run_all.py --store      the same, and stores its figures in bench/data
     python bench/run_all.py --tune       chooses the peers' parameters again
