@@ -13,8 +13,9 @@ from gso.typing import Keywords
 
 #: Arguments of :func:`gso.tno.optimize` that do not depend on the mesh.
 _ASKED = ("formulation", "options", "max_deviation", "max_strain", "target_curvature", "terms")
-#: Vertices along the longer side of a grid from which on solves for offsets along normals gain
-#: nothing from nets: iterations on the finest grids take nearly all of the time.
+#: Vertices along the longer side of a grid from which on iterations on the finest grids take nearly
+#: all of the time. Solves for offsets along normals gain nothing from nets there, and others can
+#: afford to solve a coarser copy from two starts.
 LARGE = 256
 #: Kinds of unknowns of such solves.
 _VARIABLES = ("normal", "free")

@@ -55,9 +55,6 @@ _TOO_FAR = "solved without a net: on a coarse grid its minimum is too far from t
 LEFT = (3.5e-3, 3e-4)
 #: Relative energy decrease of an iteration at which other solves from a net's result stop.
 NEARLY = 3e-3
-#: Vertices along the longer side of a grid, relative to the net's, from which on the cold start is
-#: solved on a coarser grid, too.
-_TWO_STARTS = 4
 
 
 def solve(
@@ -417,15 +414,15 @@ def _start(
         most = None if polish is True else int(polish)
         guarded = polish is not False
         return Start(points, "net", guarded=guarded, iterations=most, tolerance=NEARLY)
-    careful = effort >= 1.0
-    start = Start(points, "net", guarded=True, remaining=LEFT[careful], resolution=SIZE)
-    if max(design.grid_shape) >= _TWO_STARTS * SIZE:
+    left = LEFT[effort >= 1.0]
+    start = Start(points, "net", guarded=True, remaining=left, resolution=SIZE)
+    if max(design.grid_shape) >= LARGE:
         more = {k: v for k, v in keywords.items() if k in ("formulation", "terms")}
         solve = partial(optimize, task=task, **more)
         judged = bool(keywords.get("verdict", True))
         lower = better_start(design, points, SIZE, options, solve, judged)
         if lower is not None:
-            again = replace(lower, guarded=True, remaining=LEFT[careful])
+            again = replace(lower, guarded=True, remaining=left)
             return lower if lower.points is None else again
     return start
 
