@@ -310,6 +310,32 @@ def test_fewer_passes_of_a_net(coarse, size):
         np.testing.assert_array_equal(predict(points, model=coarse, passes=most), results[1])
 
 
+def test_gradients_of_unrolled_passes():
+    """The slope along a change of all weights is that of differences; without it, another one."""
+    net = shaken(CoarseNet(**SMALL, passes=3)).double()
+    grid = torch.as_tensor(saddle(32)[None])
+    rise = [torch.randn(p.shape, dtype=p.dtype) for p in net.parameters()]
+
+    def cost(unrolled=True):
+        return 1e3 * net.displacements(grid, unrolled=unrolled).square().sum()
+
+    def slope(unrolled):
+        found = torch.autograd.grad(cost(unrolled), list(net.parameters()))
+        return float(sum((g * r).sum() for g, r in zip(found, rise, strict=True)))
+
+    def moved(step):
+        with torch.no_grad():
+            for p, r in zip(net.parameters(), rise, strict=True):
+                p.add_(step * r)
+            return float(cost())
+
+    whole, last = slope(True), slope(False)
+    assert torch.equal(cost(), cost(False))
+    high, low = moved(1e-6), moved(-2e-6)
+    assert whole == pytest.approx((high - low) / 2e-6, rel=1e-4)
+    assert abs(last - whole) > 0.05 * abs(whole)
+
+
 def test_noise_is_told_in_the_unit_of_the_input():
     net = shaken(GSONet("denoise", channels=8, blocks=1, sigma=True), size=0.02)
     points = saddle(64)

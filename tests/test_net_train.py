@@ -201,6 +201,7 @@ def test_a_run_may_be_so_many_passes_long(folder, tmp_path):
         ({"phase": [{"loss": "energy", "eps": ["a", 1]}]}, "eps is"),
         ({"phase": [{"loss": "energy", "weights": 3}]}, "weights is 3"),
         ({"phase": [{"loss": "energy", "share": math.inf}]}, "share is inf"),
+        ({"phase": [{"loss": "energy", "unrolled": "yes"}]}, "unrolled is 'yes'"),
         ({"phase": [{"loss": "label"}], "through": "net-c"}, "through"),
         ({"phase": [{"loss": "energy"}], "against": "designs"}, "goes with through"),
         ({"against": "labels"}, "against is 'labels'"),
@@ -356,6 +357,7 @@ RUNS = {
         "denoise", {**PUBLISHED, "sigma": True}, phase=[{"loss": "clean", "batch": 4}]
     ),
     "bfloat16": replace(config(), bf16=True),
+    "unrolled": config(phase=[{"batch": 4, "weights": {"gc": 1}, "unrolled": True}]),
 }
 
 

@@ -50,11 +50,14 @@ class Net(nn.Module):
 
     @abstractmethod
     def displacements(
-        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+        self,
+        surface: Tensor,
+        sigma: Tensor | None = None,
+        *,
+        passes: int | None = None,
+        unrolled: bool = False,
     ) -> Tensor:
         """Compute the displacements (B, H, W, d) from :meth:`initial_geometry`.
-
-        Gradients flow through the last pass only; results of earlier passes are constants.
 
         Parameters
         ----------
@@ -64,6 +67,9 @@ class Net(nn.Module):
             Standard deviation of the noise, for nets that take it as an input.
         passes : int, optional
             Number of passes; all of the net's by default.
+        unrolled : bool
+            Whether gradients flow through all passes. Otherwise the results of all passes but
+            the last are constants.
         """
 
     def displacements_at(

@@ -117,15 +117,16 @@ class CoarseNet(Net):
         )
 
     def coefficients(
-        self, surface: Tensor, frame: Frame, passes: int | None = None
+        self, surface: Tensor, frame: Frame, passes: int | None = None, *, unrolled: bool = False
     ) -> tuple[Tensor, ...]:
         """Compute the coefficients (B, d, n, m) of the fields after `passes` (by default all).
 
         They are those of the coarser and the finer field, and (B, 1, n, m) of the confidence, if
-        the net has one: its logarithmic odds.
+        the net has one: its logarithmic odds. Gradients flow through the last pass, or with
+        `unrolled` through all.
         """
         passes = self.passes if passes is None else passes
-        with torch.no_grad():
+        with torch.set_grad_enabled(unrolled and torch.is_grad_enabled()):
             seen, fields = self._seen(surface, frame, passes - 1)
         return _added(fields, self._fields(seen))
 
@@ -170,10 +171,15 @@ class CoarseNet(Net):
         return (moved, *(self.unit * field for field in fields[:2]), *fields[2:])
 
     def displacements(
-        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+        self,
+        surface: Tensor,
+        sigma: Tensor | None = None,
+        *,
+        passes: int | None = None,
+        unrolled: bool = False,
     ) -> Tensor:
         frame = Frame.of(planes(surface))
-        fields = self.coefficients(surface, frame, passes)
+        fields = self.coefficients(surface, frame, passes, unrolled=unrolled)
         return self._vectors(self._shares(fields, *surface.shape[1:3]), frame)
 
     def displacements_at(

@@ -111,7 +111,12 @@ class GSONet(Net):
         self.load_state_dict(state)
 
     def displacements(
-        self, surface: Tensor, sigma: Tensor | None = None, *, passes: int | None = None
+        self,
+        surface: Tensor,
+        sigma: Tensor | None = None,
+        *,
+        passes: int | None = None,
+        unrolled: bool = False,
     ) -> Tensor:
         turn = axes(surface) if self.aligned else None
         seen = surface if turn is None else torch.einsum("bhwi,bij->bhwj", surface, turn)

@@ -67,6 +67,10 @@ class Phase:
         "energy" (developable): smoothing of \|K\| at the start, and in the second half.
     stride : int
         The net sees every `stride`-th vertex along both sides; a step with 2 costs a quarter.
+    unrolled : bool
+        Whether a step trains all passes of the net at once for the last one's result, with
+        gradients through all of them. Otherwise the steps train the passes in turn, each for
+        its own result, at a lower cost.
     """
 
     loss: str = "published"
@@ -79,6 +83,7 @@ class Phase:
     decay: float = 0.0
     eps: tuple[float, float] = (0.1, 0.01)
     stride: int = 1
+    unrolled: bool = False
 
     def __post_init__(self) -> None:
         _choice("loss", self.loss, LOSSES)
@@ -86,6 +91,8 @@ class Phase:
         _whole("stride", self.stride, 1)
         if self.stride > LARGEST_STRIDE:
             raise OptionError(f"stride is {self.stride}; take at most {LARGEST_STRIDE}")
+        if not isinstance(self.unrolled, bool):
+            raise OptionError(f"unrolled is {self.unrolled!r}; it must be true or false")
         for name in ("share", "rate", "clip", "final_rate", "decay"):
             as_positive(getattr(self, name), name, zero=name in ("final_rate", "decay"))
         _pair("eps", self.eps)

@@ -38,9 +38,12 @@ class Objective(nn.Module):
         `progress` runs from 0 to 1 within the phase.
         """
         start = self.net.initial_geometry(batch.surface)
-        # Steps train the passes in turn; earlier passes only compute the input of the last one.
-        passes = 1 + batch.step % self.net.passes
-        moved = self.net.displacements(batch.surface, batch.sigma, passes=passes)
+        if phase.unrolled:
+            moved = self.net.displacements(batch.surface, batch.sigma, unrolled=True)
+        else:
+            # Steps train the passes in turn; earlier passes only compute the last one's input.
+            passes = 1 + batch.step % self.net.passes
+            moved = self.net.displacements(batch.surface, batch.sigma, passes=passes)
         cost = _COSTS[phase.loss](self.net.kind, batch, start, phase, progress)
         found = cost(start + moved)
         if isinstance(found, Tensor):
