@@ -754,7 +754,7 @@ def test_all_nets_are_trained_by_one_command(tmp_path):
     cards = {n: read_card(tmp_path / "runs" / n / "model.safetensors") for n in HOURS}
     assert all(card["steps"] == 1 and card["data"]["n"] == 12 for card in cards.values())
     assert cards["net-f"]["begun_with"]["sha256"] == cards["net-c"]["sha256"]
-    for word, net in (("init", "net-c"), ("through", "net-c"), ("teacher", "developable")):
+    for word, net in (("init", "net-c"), ("through", "net-c"), ("teacher", "developable-fast")):
         assert cards["net-f"]["config"][word] == str(tmp_path / "runs" / net / "model.safetensors")
     (tmp_path / "runs" / "flatten-w" / "checkpoint.safetensors").unlink()
     (tmp_path / "runs" / "flatten-w" / "model.safetensors").unlink()
