@@ -213,6 +213,8 @@ class RingSurface:
             around = np.round((place[-1] - place[0]) / [count, 1.0]).astype(int)
             if np.abs(around).sum() > 1 or (around[1] and not self.is_closed):
                 return None
+            if around[1]:
+                place = _from_beginning(place)
             area = _area(place, around, count)
             first, last = _copies(place, [count, 1.0])
             for k in range(first[0], last[0] + 1):
@@ -266,6 +268,21 @@ class RingSurface:
         ends = [np.stack([place[poles + k, 0], end], axis=1) for k in (0, 1)]
         added = np.stack(ends, axis=1).reshape(-1, 2)
         return np.insert(place, np.repeat(poles + 1, 2), added, axis=0)
+
+
+def _from_beginning(place: Array) -> Array:
+    """Let a line that closes around the profile begin and end where the profile does.
+
+    The copies of its area then meet there. Elsewhere they would add corners to some facets only.
+    """
+    level = place[:, 1]
+    whole = np.floor(level)
+    k = int(np.flatnonzero(np.diff(whole))[0])
+    end = max(whole[k], whole[k + 1])
+    share = (end - level[k]) / (level[k + 1] - level[k])
+    first = np.array([place[k, 0] + share * (place[k + 1, 0] - place[k, 0]), end])
+    once = np.round(place[-1] - place[0])
+    return np.concatenate([[first], place[k + 1 : -1], place[: k + 1] + once, [first + once]])
 
 
 def _area(place: Array, around: Ints, count: float) -> Geometry:
